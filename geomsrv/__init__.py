@@ -1,0 +1,46 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""geomsrv: cull, first contact and distance queries for robots, with proven error bounds.
+
+Importable without ROS.  Everything public is re-exported here; see `geomsrv.queries` for the query functions,
+`geomsrv.shapes` for the inputs, `geomsrv.answers` for the outputs, `geomsrv.scene` for worlds of named shapes.
+"""
+
+from geomsrv.answers import (
+    Booleans,
+    ContactStatus,
+    Cost,
+    Cull,
+    CullState,
+    Distances,
+    DistanceStatus,
+    FirstContacts,
+    FrustumRegion,
+)
+from geomsrv.errors import CertificateError, GeometryError, NotAvailableError, SceneError
+from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
+from geomsrv.shapes import (
+    Box,
+    Boxes,
+    Capsule,
+    Cone,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Frustum,
+    Frustum2D,
+    HalfSpace,
+    Mesh,
+    Point,
+    Polygon,
+    Polygons,
+    Polytopes,
+    Segment,
+    Shape,
+    Sphere,
+    Triangle,
+)
+
+OUTSIDE, INTERSECTS, INSIDE = CullState.OUTSIDE, CullState.INTERSECTS, CullState.INSIDE
+NEVER, WILL_TOUCH = ContactStatus.NEVER, ContactStatus.WILL_TOUCH
+TOUCHING, OVERLAPPING = ContactStatus.TOUCHING, ContactStatus.OVERLAPPING

@@ -1,0 +1,52 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled engine: float64 arrays in, arrays out; input was validated by the caller; the GIL is released."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+_F = NDArray[np.float64]
+_I = NDArray[np.int64]
+_U = NDArray[np.uint8]
+_B = NDArray[np.bool_]
+# distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
+_Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
+
+def first_nonfinite(values: _F) -> int: ...
+def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
+def cull(frustum: _F, center: _F, axes: _F, half_extents: _F) -> tuple[_U, _B, tuple[int, int, int]]: ...
+def distance_to_frustum(frustum: _F, points: _F, witness: bool) -> tuple[_F, _F, _F, _U, _F | None]: ...
+def distance_to_frustum_2d(frustum: _F, points: _F, witness: bool) -> tuple[_F, _F, _F, _U, _F | None]: ...
+def first_contact_polygons(
+    vertices_a: _F,
+    offsets_a: _I,
+    vertices_b: _F,
+    offsets_b: _I,
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I]: ...
+def distance_polygons(vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool) -> _Distances: ...
+def distance_boxes(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
+    center_b: _F,
+    axes_b: _F,
+    half_extents_b: _F,
+    penetration: bool,
+) -> _Distances: ...
+def distance_polytopes(vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool) -> _Distances: ...
+def shape_kinds() -> tuple[str, ...]: ...
+def supported_pairs() -> _B: ...
+def distance_pairs(
+    kinds: _U,
+    params: _F,
+    vertices: _F,
+    offsets: _I,
+    pairs: _I,
+    poses_ab: _F,
+    penetration: bool,
+) -> _Distances: ...
+def overlapping_pairs(lower: _F, upper: _F) -> _I: ...

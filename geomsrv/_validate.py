@@ -1,0 +1,155 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""The edge: everything a caller passes in is checked here, once, and leaves as C-contiguous float64.
+
+Each fault becomes a `GeometryError` that names the argument, the item's index and what was wrong.
+Nothing below this line checks its input again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geomsrv import _core
+from geomsrv.errors import GeometryError, NotAvailableError
+
+ACCURACIES = ("bound", "float32", "float64", "exact")  #: every tier, cheapest first
+AVAILABLE_ACCURACIES = ("float64",)  #: the tiers this version answers
+
+# A rotation is refused if a row's length or the angle between two rows is off by more than this: beyond it the caller
+# has passed something else (a scaled matrix, a transposed block), not a rotation that drifted.  Up to it the numbers
+# are taken literally, as design promises: a box is the hull of center +- e_i * axes_i.
+MAX_AXES_DEFECT = 1e-2
+
+# Quaternions are normalised; one whose norm is further from 1 than float32 drift allows is a mistake, not drift.
+MAX_QUATERNION_DEFECT = 1e-3
+
+
+def shape_text(shape: tuple[int | None, ...]) -> str:
+    """(None, 3) -> "(n, 3)"."""
+    names = iter("nmk")
+    inner = ", ".join(next(names) if size is None else str(size) for size in shape)
+    return f"({inner},)" if len(shape) == 1 else f"({inner})"
+
+
+def floats(value: Any, name: str, shape: tuple[int | None, ...], *, allow_infinite: bool = False) -> NDArray[np.float64]:
+    """`value` as finite C-contiguous float64 of the given shape (None: any size)."""
+    if np.ma.isMaskedArray(value):
+        raise GeometryError(f"{name} must not be a masked array")
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu":
+        raise GeometryError(f"{name} must hold real numbers, got dtype {array.dtype}")
+    if array.dtype.itemsize > 8:
+        raise GeometryError(f"{name} must be representable in float64, got dtype {array.dtype}")
+    if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
+        raise GeometryError(f"{name} must have shape {shape_text(shape)}, got {array.shape}")
+    array = np.asarray(array, dtype=np.float64, order="C")
+    if allow_infinite:
+        if np.isnan(array).any():
+            raise GeometryError(f"{name}{_where(array, int(np.isnan(array).argmax()))} is nan")
+        return array
+    bad = _core.first_nonfinite(array.reshape(-1))
+    if bad >= 0:
+        raise GeometryError(f"{name}{_where(array, bad)} is {array.reshape(-1)[bad]}, must be finite")
+    return array
+
+
+def _where(array: NDArray[Any], flat_index: int) -> str:
+    """Index text of a flat position: "[3, 1]"; empty for a scalar."""
+    index = np.unravel_index(flat_index, array.shape)
+    return f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
+
+
+def scalar(value: Any, name: str, *, positive: bool = False, minimum: float | None = None) -> float:
+    """One finite number."""
+    number = float(floats(value, name, ()))
+    if positive and not number > 0.0:
+        raise GeometryError(f"{name} must be > 0, got {number}")
+    if minimum is not None and number < minimum:
+        raise GeometryError(f"{name} must be >= {minimum:g}, got {number}")
+    return number
+
+
+def offsets(value: Any, name: str, total: int, minimum_count: int) -> NDArray[np.int64]:
+    """Ragged row offsets: starts at 0, ends at `total`, every item has at least `minimum_count` rows."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iu":
+        raise GeometryError(f"{name} must hold integers, got dtype {array.dtype}")
+    if array.ndim != 1 or len(array) < 1:
+        raise GeometryError(f"{name} must have shape (n + 1,), got {array.shape}")
+    array = np.ascontiguousarray(array, dtype=np.int64)
+    if array[0] != 0 or array[-1] != total:
+        raise GeometryError(f"{name} must run from 0 to {total}, got {array[0]} to {array[-1]}")
+    counts = np.diff(array)
+    if (counts < minimum_count).any():
+        i = int(np.argmax(counts < minimum_count))
+        raise GeometryError(f"{name}: item {i} has {counts[i]} vertices, needs at least {minimum_count}")
+    return array
+
+
+def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Rows of unit, mutually perpendicular axes, taken literally up to `MAX_AXES_DEFECT`; either handedness."""
+    array = floats(value, name, shape)
+    size = array.shape[-1]
+    gram = array @ np.swapaxes(array, -1, -2)
+    defect = np.abs(gram - np.eye(size)).max(axis=(-1, -2)) if array.size else np.zeros(array.shape[:-2])
+    if (defect > MAX_AXES_DEFECT).any():
+        i = int(np.argmax(np.ravel(defect > MAX_AXES_DEFECT)))
+        item = f"[{i}]" if array.ndim == 3 else ""
+        raise GeometryError(
+            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} (at most {MAX_AXES_DEFECT:g})"
+        )
+    return array
+
+
+def poses(value: Any, name: str = "poses") -> NDArray[np.float64]:
+    """(n, 7) or (7,) rows x y z qx qy qz qw -> (n, 7) with unit quaternions."""
+    array = np.asarray(value)
+    array = floats(array, name, (7,) if array.ndim == 1 else (None, 7)).reshape(-1, 7)
+    norm = np.linalg.norm(array[:, 3:], axis=1)
+    bad = np.abs(norm - 1.0) > MAX_QUATERNION_DEFECT
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise GeometryError(f"{name}[{i}] quaternion x y z w must have norm 1, got {norm[i]:.6g}")
+    out = array.copy()
+    out[:, 3:] /= norm[:, None]
+    return out
+
+
+def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 4) unit x y z w -> (n, 3, 3) rotation matrices R, v_world = R v_body."""
+    x, y, z, w = quaternions.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def accuracy(value: Any) -> str:
+    """A tier this version answers."""
+    if value not in ACCURACIES:
+        raise GeometryError(f"accuracy must be one of {', '.join(ACCURACIES)}, got {value!r}")
+    if value not in AVAILABLE_ACCURACIES:
+        raise NotAvailableError(f"accuracy={value!r} is not available yet; this version answers 'float64'")
+    return str(value)
+
+
+def certificates(value: Any) -> None:
+    """Certificates are named in the interface and arrive with the exact tier."""
+    if value:
+        raise NotAvailableError("certificates=True is not available yet")
+
+
+def want(value: Any, known: tuple[str, ...]) -> frozenset[str]:
+    """The set of named effects asked for."""
+    names = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
+    for name in names:
+        if name not in known:
+            raise GeometryError(f"want must name some of {', '.join(known)}, got {name!r}")
+    return frozenset(names)

@@ -1,0 +1,227 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""What queries return: named outcomes (enums), answers (frozen arrays), and what they cost.
+
+Only values live here.  Row i of every array belongs to item i of the batch; NaN marks "has no meaning here".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Booleans",
+    "ContactStatus",
+    "Cost",
+    "Cull",
+    "CullState",
+    "DistanceStatus",
+    "Distances",
+    "FirstContacts",
+    "FrustumRegion",
+]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ByteArray = NDArray[np.uint8]
+BoolArray = NDArray[np.bool_]
+
+
+class CullState(IntEnum):
+    """Where a box lies with respect to a frustum; both are closed sets."""
+
+    OUTSIDE = 0  #: no common point
+    INTERSECTS = 1  #: a common point, and a point of the box outside the frustum
+    INSIDE = 2  #: every point of the box is in the frustum
+
+
+class ContactStatus(IntEnum):
+    """Outcome of a first-contact query."""
+
+    NEVER = 0  #: no contact within ``t_max``
+    WILL_TOUCH = 1  #: apart now, first contact at ``time``
+    TOUCHING = 2  #: in contact at t = 0 without a common interior point
+    OVERLAPPING = 3  #: common interior points at t = 0
+    UNSUPPORTED = 4  #: no kernel for this pair or motion; every number is NaN
+    NOT_CONVERGED = 5  #: the work budget ran out; ``time_lower`` and ``time_upper`` bracket the answer
+
+
+class DistanceStatus(IntEnum):
+    """Outcome of a distance query."""
+
+    OK = 0  #: the interval is as narrow as the tier promises
+    NOT_CONVERGED = 1  #: iterations ran out; the interval still holds
+    UNSUPPORTED = 2  #: no kernel for this pair of shapes; every number is NaN
+
+
+# Names are [NEAR|FAR]_[LEFT|RIGHT]_[UP|DOWN], the faces that meet in the feature; LEFT is the +L side, UP the +U side.
+FrustumRegion = IntEnum(
+    "FrustumRegion",
+    {
+        "_".join(part for part in (depth, side, height) if part) or "INSIDE": 9 * k + 3 * j + i
+        for k, depth in enumerate(("", "NEAR", "FAR"))
+        for j, height in enumerate(("", "UP", "DOWN"))
+        for i, side in enumerate(("", "LEFT", "RIGHT"))
+    },
+    module=__name__,
+)
+FrustumRegion.__doc__ = """Feature of a frustum nearest to a point: INSIDE, a face, an edge or a vertex.
+
+The value is ``9 * depth + 3 * height + side`` with 0 for none, depth 1 NEAR, 2 FAR, height 1 UP (+U), 2 DOWN (-U),
+side 1 LEFT (+L), 2 RIGHT (-L); so INSIDE is 0, ``NEAR`` 9, ``FAR_LEFT_UP`` 22.
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a batch of answers cost.
+
+    Attributes
+    ----------
+    elapsed_ns : int
+        Wall time inside the query, validation included.
+    accuracy : str
+        The tier that answered.
+    counts : dict of str to int
+        Items decided per stage, by the stage's name.
+    """
+
+    elapsed_ns: int
+    accuracy: str
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Cull:
+    """Answer of `cull`.
+
+    Attributes
+    ----------
+    state : (n,) uint8
+        `CullState` of every box.
+    certain : (n,) bool
+        True where the margin exceeds the proven rounding error, so exact arithmetic gives the same state.
+    cost : Cost
+    """
+
+    state: ByteArray
+    certain: BoolArray
+    cost: Cost
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Answer of `distance` and `distance_to_frustum`.
+
+    Attributes
+    ----------
+    distance, lower, upper : (n,) float64
+        Distance [m] and a proven interval around the exact value.  0 for touching and overlapping bodies, or minus the
+        penetration depth if ``want`` names "penetration".
+    point_b : (n, d) float64
+        Nearest point on b, or its deepest point in a; for `distance_to_frustum` the query points.
+    status : (n,) uint8
+        `DistanceStatus`.
+    region : (n,) uint8 or None
+        `FrustumRegion` of the nearest feature; only from `distance_to_frustum`.
+    message : str
+        Names what is unsupported; empty otherwise.
+    cost : Cost
+
+    Points and normals of two shapes are in the frame of a, those of two batches in the world frame.
+    """
+
+    distance: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    point_b: FloatArray
+    status: ByteArray
+    cost: Cost
+    _point_a: FloatArray | Callable[[], FloatArray] = field(repr=False)
+    _normal: FloatArray | None = field(default=None, repr=False)
+    region: ByteArray | None = None
+    message: str = ""
+
+    @cached_property
+    def point_a(self) -> FloatArray:
+        """(n, d) float64: nearest point on a, or its deepest point in b.
+
+        `distance_to_frustum` finds it on first use unless ``want`` names "witness".
+        """
+        return self._point_a() if callable(self._point_a) else self._point_a
+
+    @cached_property
+    def normal(self) -> FloatArray:
+        """(n, d) float64: unit, from a to b; NaN where there is none.
+
+        Moving b by ``depth * normal`` separates overlapping bodies.
+        """
+        if self._normal is not None:
+            return self._normal
+        gap = self.point_b - self.point_a
+        length = np.linalg.norm(gap, axis=-1, keepdims=True)
+        return np.divide(gap, length, out=np.full_like(gap, np.nan), where=length > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Booleans:
+    """Answer of `intersects`.
+
+    Attributes
+    ----------
+    value : (n,) bool
+        True where the closed bodies have a common point; False where ``status`` is UNSUPPORTED, never ``certain`` then.
+    certain : (n,) bool
+        True where exact arithmetic is proven to give the same value.
+    status : (n,) uint8
+        `DistanceStatus`.
+    message : str
+        Names what is unsupported; empty otherwise.
+    cost : Cost
+    """
+
+    value: BoolArray
+    certain: BoolArray
+    status: ByteArray
+    cost: Cost
+    message: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstContacts:
+    """Answer of `first_contact`.
+
+    Attributes
+    ----------
+    status : (n,) uint8
+        `ContactStatus`.
+    time, time_lower, time_upper : (n,) float64
+        First contact [s] and a proven interval; 0 if in contact at the start, NaN for NEVER and UNSUPPORTED.
+    last_time : (n,) float64
+        Last contact [s], at most ``t_max``; inf if they never part, NaN for NEVER and UNSUPPORTED.
+    normal : (n, d) float64
+        Unit contact normal from a to b at ``time``; NaN where there is none.
+    points : (k, d) float64, point_offsets : (n + 1,) int64
+        Contact set of item i: ``points[point_offsets[i]:point_offsets[i + 1]]``, one point, the two ends of a segment,
+        or the counter-clockwise intersection polygon of bodies that overlap at the start.
+    message : str
+        Names what is unsupported; empty otherwise.
+    cost : Cost
+    """
+
+    status: ByteArray
+    time: FloatArray
+    time_lower: FloatArray
+    time_upper: FloatArray
+    last_time: FloatArray
+    normal: FloatArray
+    points: FloatArray
+    point_offsets: IntArray
+    cost: Cost
+    message: str = ""

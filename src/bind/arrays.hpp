@@ -1,0 +1,56 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Array types that every binding shares, and how results are handed to numpy.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+
+namespace geomsrv::bind {
+
+namespace nb = nanobind;
+
+// The Python layer validates; here a wrong dtype or layout is a programming error and is refused, not copied,
+// so every array argument is declared with nb::arg("...").noconvert().
+template <class T, class... Shape>
+using Input = nb::ndarray<const T, Shape..., nb::c_contig, nb::device::cpu>;
+
+using Values = Input<double, nb::ndim<1>>;
+using Rows2 = Input<double, nb::shape<-1, 2>>;
+using Rows3 = Input<double, nb::shape<-1, 3>>;
+using Rows4 = Input<double, nb::shape<-1, 4>>;
+using Rows7 = Input<double, nb::shape<-1, 7>>;
+using Matrices3 = Input<double, nb::shape<-1, 3, 3>>;
+using Offsets = Input<std::int64_t, nb::ndim<1>>;
+using Pairs = Input<std::int64_t, nb::shape<-1, 2>>;
+using Codes = Input<std::uint8_t, nb::ndim<1>>;
+
+/// A result: numpy owns the memory, `data` is where the batch loop writes (with the GIL released).
+template <class T>
+struct Output {
+    nb::object array;
+    T* data = nullptr;
+};
+
+/// numpy.empty: large results get huge pages from numpy's allocator, which halves the page faults of a big batch.
+template <class T>
+Output<T> empty(std::initializer_list<std::size_t> shape) {
+    static_assert(sizeof(T) == 1 || sizeof(T) == 8);
+    const char* dtype = std::is_same_v<T, double>         ? "float64"
+                        : std::is_same_v<T, std::int64_t> ? "int64"
+                        : std::is_same_v<T, bool>         ? "bool"
+                                                          : "uint8";
+    nb::list sizes;
+    for (const std::size_t size : shape) {
+        sizes.append(size);
+    }
+    nb::object array = nb::module_::import_("numpy").attr("empty")(nb::tuple(sizes), dtype);
+    return {array, nb::cast<nb::ndarray<T, nb::c_contig, nb::device::cpu>>(array).data()};
+}
+
+}  // namespace geomsrv::bind
