@@ -1,7 +1,42 @@
-.PHONY: help build
+# `make help` lists the targets. Everything runs in .venv, which `make build` makes and keeps up to date.
+BIN := .venv/bin
+CPP := $(wildcard src/*/*.cpp)
+HPP := $(wildcard src/*/*.hpp)
+
+.PHONY: help build test soak demo bench lint format colcon clean
 
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z]*\):[^#]*## /\1\t/p' Makefile | expand -t 10
 
 build:  ## make .venv and build geomsrv into it
 	@tools/build
+
+test: build  ## run the tests on the installed package; ARGS="-k cull" selects some
+	$(BIN)/pytest $(ARGS)
+
+soak: build  ## run all tests, the long ones too, with larger random counts
+	GEOMSRV_SOAK=1 $(BIN)/pytest -m "soak or not soak" --timeout 7200 $(ARGS)
+
+demo: build  ## a real robot, a node and a client; writes a picture
+	$(BIN)/geomsrv demo $(ARGS)
+
+bench: build  ## time the queries against numpy and python-fcl
+	$(BIN)/python bench/run.py $(ARGS)
+
+lint: build  ## check format, names and types
+	$(BIN)/clang-format --dry-run -Werror $(CPP) $(HPP)
+	printf '%s\n' $(CPP) | xargs -P 2 -n 1 $(BIN)/clang-tidy -p build --quiet
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format:  ## rewrite the sources in the settled format
+	$(BIN)/clang-format -i $(CPP) $(HPP)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+colcon: build  ## colcon build and colcon test in a scratch workspace
+	tools/colcon
+
+clean:  ## remove everything that make has made
+	rm -rf .venv build demo_output

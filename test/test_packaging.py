@@ -1,0 +1,82 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the build installs, and where: these tests run on the installed package."""
+
+import ast
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import geomsrv
+from geomsrv import _core
+
+SOURCE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(geomsrv.__file__).parent
+# lib/python3.12/site-packages/geomsrv is four levels below the prefix.
+PREFIX = PACKAGE.parents[3]
+
+
+def test_tests_see_the_installed_package():
+    assert SOURCE / "geomsrv" != PACKAGE
+    assert "site-packages" in PACKAGE.parts
+
+
+def test_version_is_written_in_package_xml_only():
+    version = re.search("<version>(.+)</version>", (SOURCE / "package.xml").read_text())[1]
+    assert geomsrv.__version__ == version
+    for name in ("CMakeLists.txt", "pyproject.toml", "setup.py", "geomsrv/__init__.py"):
+        assert version not in re.findall(r"\d+\.\d+\.\d+", (SOURCE / name).read_text()), name
+
+
+def test_every_python_file_is_installed():
+    def tree(root):
+        return {path.relative_to(root) for path in root.rglob("*.py*") if path.suffix != ".pyc"}
+
+    written = tree(SOURCE / "geomsrv")
+    installed = tree(PACKAGE)
+    assert written
+    assert written <= installed
+    generated = {path for path in installed - written if path.parts[0] not in ("msg", "srv")}
+    assert generated == {Path("_version.py")}
+    assert (PACKAGE / "py.typed").exists()
+
+
+@pytest.mark.parametrize("kind", ["msg", "srv"])
+def test_every_interface_is_importable(kind):
+    names = sorted(path.stem for path in (SOURCE / kind).glob(f"*.{kind}"))
+    assert names
+    module = importlib.import_module(f"geomsrv.{kind}")
+    assert [name for name in names if not hasattr(module, name)] == []
+
+
+def test_config_and_launch_files_are_installed():
+    share = PREFIX / "share" / "geomsrv"
+    for folder in ("config", "launch"):
+        names = sorted(path.name for path in (SOURCE / folder).iterdir() if path.is_file())
+        assert names
+        assert sorted(path.name for path in (share / folder).iterdir() if path.is_file()) == names
+    assert (share / "package.xml").exists()
+
+
+@pytest.mark.parametrize("place", ["bin/geomsrv", "lib/geomsrv/geomsrv", "lib/geomsrv/node"])
+def test_commands_run(place):
+    command = PREFIX / place
+    done = subprocess.run([command, "--help"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "usage" in done.stdout.lower()
+
+
+def test_console_command_is_on_the_path_of_its_environment():
+    assert shutil.which("geomsrv", path=str(Path(sys.executable).parent)) is not None
+
+
+def test_stub_names_what_the_module_has():
+    tree = ast.parse((PACKAGE / "_core.pyi").read_text())
+    stub = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    module = {name for name in dir(_core) if not name.startswith("_")}
+    assert stub == module
