@@ -1,0 +1,187 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Benchmarks: ns per item, ratio to numpy doing the same, ratio to python-fcl where it can; then the node's latencies.
+
+Contenders of one scenario take turns in one process, so a drifting machine slows all alike; the median is printed.
+Run as ``python bench/run.py [--quick] [--only TEXT] [--json FILE]``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+# One core for all contenders; must be set before numpy is loaded.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+import baselines  # noqa: E402
+import numpy as np  # noqa: E402
+import ros  # noqa: E402
+import scenarios  # noqa: E402
+from rich.console import Console  # noqa: E402
+from rich.table import Table  # noqa: E402
+
+import geomsrv as gs  # noqa: E402
+
+Call = Callable[[], object]
+
+
+@dataclass
+class Scenario:
+    """One question; every contender is a call and how many items it answers."""
+
+    name: str
+    target_ns: float | None
+    ours: tuple[Call, int]
+    numpy: tuple[Call, int] | None = None
+    fcl: tuple[Call, int] | None = None
+    median_ns: dict[str, float] = field(default_factory=dict)
+
+    def run(self, rounds: int) -> None:
+        """Time all contenders, taking turns."""
+        contenders = {k: c for k, c in (("ours", self.ours), ("numpy", self.numpy), ("fcl", self.fcl)) if c}
+        samples: dict[str, list[float]] = {key: [] for key in contenders}
+        for turn in range(rounds + 1):  # the first turn warms up
+            for key, (call, items) in contenders.items():
+                begin = time.perf_counter_ns()
+                call()
+                if turn:
+                    samples[key].append((time.perf_counter_ns() - begin) / items)
+        self.median_ns = {key: statistics.median(values) for key, values in samples.items()}
+
+
+def declare(quick: bool) -> list[Scenario]:
+    """The table of scenarios."""
+    cut = 10 if quick else 1
+    frustum, boxes = scenarios.boxes_half_visible(100_000 // cut)
+    visible = float(np.mean(gs.cull(frustum, boxes).state != gs.OUTSIDE))
+    _, points = scenarios.points_around_frustum(1_000_000 // cut)
+    a, b, velocity_a, velocity_b = scenarios.moving_polygons(100_000 // cut)
+    hits = float(np.mean(gs.first_contact(a, b, velocity_a, velocity_b).status == gs.WILL_TOUCH))
+    few = 1000
+    single_boxes = [gs.Box(h) for h in boxes.half_extents[:few]]
+    box_poses = scenarios.relative_poses(few, 0.5, 8.0)
+    table = [
+        Scenario(
+            f"cull, boxes, {visible:.0%} visible",
+            60.0,
+            (lambda: gs.cull(frustum, boxes), len(boxes)),
+            (lambda: baselines.numpy_cull(frustum, boxes), len(boxes)),
+            (baselines.fcl_pairs(frustum, single_boxes[0], box_poses, "collide"), few),
+        ),
+        Scenario(
+            "point to frustum distance",
+            10.0,
+            (lambda: gs.distance_to_frustum(frustum, points), len(points)),
+            (lambda: baselines.numpy_distance_to_frustum(frustum, points), len(points)),
+            (baselines.fcl_pairs(frustum, gs.Sphere(0.0), box_poses, "distance"), few),
+        ),
+        Scenario(
+            "point to frustum, with nearest points",
+            None,
+            (lambda: gs.distance_to_frustum(frustum, points, want=("distance", "witness")), len(points)),
+        ),
+        Scenario(
+            f"first contact, polygons 4-16, {hits:.0%} hits",
+            600.0,
+            (lambda: gs.first_contact(a, b, velocity_a, velocity_b), len(a)),
+            (lambda: baselines.numpy_first_contact(a, b, velocity_a, velocity_b), len(a)),
+        ),
+        Scenario("polygon distance 4-16", None, (lambda: gs.distance(a, b), len(a))),
+    ]
+    far = scenarios.relative_poses(10_000 // cut, 0.35, 1.0)
+    near = scenarios.relative_poses(10_000 // cut, 0.0, 0.1)
+    for name, (p, q) in scenarios.SHAPE_PAIRS.items():
+        by_numpy = None
+        if name == "sphere-sphere":
+            by_numpy = (lambda p=p, q=q: baselines.numpy_sphere_sphere(far, p.radius, q.radius), len(far))
+        table.append(
+            Scenario(
+                f"distance {name}, apart",
+                None,
+                (lambda p=p, q=q: gs.distance(p, q, far), len(far)),
+                by_numpy,
+                (baselines.fcl_pairs(p, q, far[:few], "distance"), few),
+            )
+        )
+        table.append(
+            Scenario(
+                f"penetration {name}, overlapping",
+                None,
+                (lambda p=p, q=q: gs.distance(p, q, near, want=("penetration",)), len(near)),
+                fcl=(baselines.fcl_pairs(p, q, near[:few], "collide"), few),
+            )
+        )
+    table += _scene_scenarios(1_000 if quick else 10_000)
+    return table
+
+
+def _scene_scenarios(n: int) -> list[Scenario]:
+    """A world of boxes at the density of a cluttered cell, one evaluation an item-shape."""
+    rng = np.random.default_rng(scenarios.SEED)
+    side = (n * 0.05) ** (1 / 3)
+    scene = gs.Scene()
+    poses = scenarios.relative_poses(n, 0.0, 1.0)
+    poses[:, :3] = rng.uniform(0.0, side, (n, 3))
+    boxes = [gs.Box(h) for h in rng.uniform(0.02, 0.1, (n, 3))]
+    scene.apply(
+        gs.SceneUpdate(add=[gs.SceneObject(str(i), s, p) for i, (s, p) in enumerate(zip(boxes, poses, strict=True))])
+    )
+    ids = scene.ids
+
+    def step() -> object:
+        scene.set_states(ids, poses)
+        return scene.distances(0.02)
+
+    return [Scenario(f"scene step, {n:,} boxes, pairs within 2 cm", None, (step, n))]
+
+
+def print_table(console: Console, table: list[Scenario]) -> None:
+    """Medians and ratios."""
+    out = Table(title="Batch calls from Python, one core, medians")
+    for heading in ("scenario", "items", "ns per item", "target", "numpy / ours", "fcl / ours"):
+        out.add_column(heading, justify="left" if heading == "scenario" else "right")
+    for s in table:
+        ours = s.median_ns["ours"]
+        ratio = {k: f"{s.median_ns[k] / ours:,.1f}" if k in s.median_ns else "" for k in ("numpy", "fcl")}
+        target = "" if s.target_ns is None else f"{s.target_ns:g} {'met' if ours <= s.target_ns else 'MISSED'}"
+        out.add_row(s.name, f"{s.ours[1]:,}", f"{ours:,.1f}", target, ratio["numpy"], ratio["fcl"])
+    console.print(out)
+
+
+def main() -> None:
+    """Run, print, and write JSON if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the items, fewer rounds")
+    parser.add_argument("--only", default="", help="scenarios whose name contains this text")
+    parser.add_argument("--json", type=Path, help="also write the figures here")
+    arguments = parser.parse_args()
+    console = Console(width=120)
+    table = [s for s in declare(arguments.quick) if arguments.only in s.name]
+    for scenario in table:
+        scenario.run(3 if arguments.quick else 9)
+    if table:
+        print_table(console, table)
+    node = ros.measure(arguments.quick) if arguments.only in "node" else []
+    for line in node:
+        console.print(line)
+    if arguments.json:
+        record = {
+            "machine": platform.processor() or platform.machine(),
+            "python": platform.python_version(),
+            "scenarios": {s.name: s.median_ns for s in table},
+            "node": [str(line) for line in node],
+        }
+        arguments.json.write_text(json.dumps(record, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
