@@ -19,6 +19,15 @@ from geomsrv.answers import (
 )
 from geomsrv.errors import CertificateError, GeometryError, NotAvailableError, SceneError
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
+from geomsrv.scene import (
+    PairContacts,
+    PairDistances,
+    Scene,
+    SceneCull,
+    SceneObject,
+    SceneUpdate,
+    Visibility,
+)
 from geomsrv.shapes import (
     Box,
     Boxes,
