@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lets pip run the same CMake as every other build and package what it installs.
 
-Under build isolation that is the core. Messages and node are added where the ROS generators can be imported, which
-takes `pip install --no-build-isolation .` in an environment that has them.
+Under build isolation that is the core. Messages and node are added where the ROS generators can be
+imported, which takes `pip install --no-build-isolation .` in an environment that has them.
 """
 
 import importlib.util
