@@ -52,9 +52,9 @@ def test_every_interface_is_importable(kind):
     assert [name for name in names if not hasattr(module, name)] == []
 
 
-def test_config_and_launch_files_are_installed():
+def test_files_beside_the_package_are_installed():
     share = PREFIX / "share" / "geomsrv"
-    for folder in ("config", "launch"):
+    for folder in ("config", "demo", "launch"):
         names = sorted(path.name for path in (SOURCE / folder).iterdir() if path.is_file())
         assert names
         assert sorted(path.name for path in (share / folder).iterdir() if path.is_file()) == names
