@@ -20,12 +20,12 @@ from geomsrv.errors import GeometryError, NotAvailableError
 ACCURACIES = ("bound", "float32", "float64", "exact")  #: every tier, cheapest first
 AVAILABLE_ACCURACIES = ("float64",)  #: the tiers this version answers
 
-# A rotation is refused if a row's length or the angle between two rows is off by more than this: beyond it the caller
-# has passed something else (a scaled matrix, a transposed block), not a rotation that drifted.  Up to it the numbers
-# are taken literally, as design promises: a box is the hull of center +- e_i * axes_i.
+# A rotation is refused if a row's length or the angle between two rows is off by more than this: beyond it
+# the caller has passed something else (a scaled matrix, a transposed block), not a rotation that drifted.
+# Up to it the numbers are taken literally: a box is the hull of center +- e_i * axes_i.
 MAX_AXES_DEFECT = 1e-2
 
-# Quaternions are normalised; one whose norm is further from 1 than float32 drift allows is a mistake, not drift.
+# Quaternions are normalised; a norm further from 1 than float32 drift allows is a mistake, not drift.
 MAX_QUATERNION_DEFECT = 1e-3
 
 
@@ -36,26 +36,39 @@ def shape_text(shape: tuple[int | None, ...]) -> str:
     return f"({inner},)" if len(shape) == 1 else f"({inner})"
 
 
-def floats(value: Any, name: str, shape: tuple[int | None, ...], *, allow_infinite: bool = False) -> NDArray[np.float64]:
-    """`value` as finite C-contiguous float64 of the given shape (None: any size)."""
+def array(value: Any, name: str) -> NDArray[Any]:
+    """`value` as an array of whatever it holds; numpy's own complaint would not name the argument."""
     if np.ma.isMaskedArray(value):
         raise GeometryError(f"{name} must not be a masked array")
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu":
-        raise GeometryError(f"{name} must hold real numbers, got dtype {array.dtype}")
-    if array.dtype.itemsize > 8:
-        raise GeometryError(f"{name} must be representable in float64, got dtype {array.dtype}")
-    if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise GeometryError(f"{name} must have shape {shape_text(shape)}, got {array.shape}")
-    array = np.asarray(array, dtype=np.float64, order="C")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} is not an array: {error}") from error
+
+
+def floats(
+    value: Any, name: str, shape: tuple[int | None, ...], *, allow_infinite: bool = False
+) -> NDArray[np.float64]:
+    """`value` as finite C-contiguous float64 of the given shape (None: any size)."""
+    given = array(value, name)
+    if given.dtype.kind not in "fiu":
+        raise GeometryError(f"{name} must hold real numbers, got dtype {given.dtype}")
+    if given.dtype.itemsize > 8:
+        raise GeometryError(f"{name} must be representable in float64, got dtype {given.dtype}")
+    if given.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, given.shape, strict=True)
+    ):
+        wanted = f"have shape {shape_text(shape)}" if shape else "be a single number"
+        raise GeometryError(f"{name} must {wanted}, got shape {given.shape}")
+    numbers = np.asarray(given, dtype=np.float64, order="C")
     if allow_infinite:
-        if np.isnan(array).any():
-            raise GeometryError(f"{name}{_where(array, int(np.isnan(array).argmax()))} is nan")
-        return array
-    bad = _core.first_nonfinite(array.reshape(-1))
+        if np.isnan(numbers).any():
+            raise GeometryError(f"{name}{_where(numbers, int(np.isnan(numbers).argmax()))} is nan")
+        return numbers
+    bad = _core.first_nonfinite(numbers.reshape(-1))
     if bad >= 0:
-        raise GeometryError(f"{name}{_where(array, bad)} is {array.reshape(-1)[bad]}, must be finite")
-    return array
+        raise GeometryError(f"{name}{_where(numbers, bad)} is {numbers.reshape(-1)[bad]}, must be finite")
+    return numbers
 
 
 def _where(array: NDArray[Any], flat_index: int) -> str:
@@ -76,46 +89,55 @@ def scalar(value: Any, name: str, *, positive: bool = False, minimum: float | No
 
 def offsets(value: Any, name: str, total: int, minimum_count: int) -> NDArray[np.int64]:
     """Ragged row offsets: starts at 0, ends at `total`, every item has at least `minimum_count` rows."""
-    array = np.asarray(value)
-    if array.dtype.kind not in "iu":
-        raise GeometryError(f"{name} must hold integers, got dtype {array.dtype}")
-    if array.ndim != 1 or len(array) < 1:
-        raise GeometryError(f"{name} must have shape (n + 1,), got {array.shape}")
-    array = np.ascontiguousarray(array, dtype=np.int64)
-    if array[0] != 0 or array[-1] != total:
-        raise GeometryError(f"{name} must run from 0 to {total}, got {array[0]} to {array[-1]}")
-    counts = np.diff(array)
+    given = array(value, name)
+    if given.dtype.kind not in "iu":
+        raise GeometryError(f"{name} must hold integers, got dtype {given.dtype}")
+    if given.ndim != 1 or len(given) < 1:
+        raise GeometryError(f"{name} must have shape (n + 1,), got {given.shape}")
+    if given[0] != 0 or given[-1] != total:
+        raise GeometryError(f"{name} must run from 0 to {total}, got {given[0]} to {given[-1]}")
+    # Before any subtraction: differences of huge offsets wrap around to plausible counts.
+    outside = (given < 0) | (given > total)
+    if outside.any():
+        i = int(np.argmax(outside))
+        raise GeometryError(f"{name}[{i}] is {given[i]}, outside 0..{total}")
+    ends = np.ascontiguousarray(given, dtype=np.int64)
+    counts = np.diff(ends)
     if (counts < minimum_count).any():
         i = int(np.argmax(counts < minimum_count))
         raise GeometryError(f"{name}: item {i} has {counts[i]} vertices, needs at least {minimum_count}")
-    return array
+    return ends
 
 
 def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Rows of unit, mutually perpendicular axes, taken literally up to `MAX_AXES_DEFECT`; either handedness."""
-    array = floats(value, name, shape)
-    size = array.shape[-1]
-    gram = array @ np.swapaxes(array, -1, -2)
-    defect = np.abs(gram - np.eye(size)).max(axis=(-1, -2)) if array.size else np.zeros(array.shape[:-2])
-    if (defect > MAX_AXES_DEFECT).any():
-        i = int(np.argmax(np.ravel(defect > MAX_AXES_DEFECT)))
-        item = f"[{i}]" if array.ndim == 3 else ""
+    """Unit, mutually perpendicular rows, taken literally up to `MAX_AXES_DEFECT`; either handedness."""
+    rows = floats(value, name, shape)
+    with np.errstate(over="ignore", invalid="ignore"):  # huge entries give inf and nan, refused below
+        gram = rows @ np.swapaxes(rows, -1, -2)
+        defect = np.abs(gram - np.eye(rows.shape[-1])).max(axis=(-1, -2), initial=0.0)
+    bad = np.ravel(~(defect <= MAX_AXES_DEFECT))
+    if bad.any():
+        i = int(np.argmax(bad))
+        item = f"[{i}]" if rows.ndim == 3 else ""
         raise GeometryError(
-            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} (at most {MAX_AXES_DEFECT:g})"
+            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} "
+            f"(at most {MAX_AXES_DEFECT:g})"
         )
-    return array
+    return rows
 
 
 def poses(value: Any, name: str = "poses") -> NDArray[np.float64]:
     """(n, 7) or (7,) rows x y z qx qy qz qw -> (n, 7) with unit quaternions."""
-    array = np.asarray(value)
-    array = floats(array, name, (7,) if array.ndim == 1 else (None, 7)).reshape(-1, 7)
-    norm = np.linalg.norm(array[:, 3:], axis=1)
-    bad = np.abs(norm - 1.0) > MAX_QUATERNION_DEFECT
+    given = array(value, name)
+    rows = floats(given, name, (7,) if given.ndim == 1 else (None, 7)).reshape(-1, 7)
+    with np.errstate(over="ignore"):  # huge entries give inf, refused below
+        norm = np.linalg.norm(rows[:, 3:], axis=1)
+    bad = ~(np.abs(norm - 1.0) <= MAX_QUATERNION_DEFECT)
     if bad.any():
         i = int(np.argmax(bad))
-        raise GeometryError(f"{name}[{i}] quaternion x y z w must have norm 1, got {norm[i]:.6g}")
-    out = array.copy()
+        item = f"[{i}]" if given.ndim == 2 else ""
+        raise GeometryError(f"{name}{item} quaternion x y z w must have norm 1, got {norm[i]:.6g}")
+    out = rows.copy()
     out[:, 3:] /= norm[:, None]
     return out
 
@@ -133,15 +155,17 @@ def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def accuracy(value: Any) -> str:
     """A tier this version answers."""
-    if value not in ACCURACIES:
+    if not isinstance(value, str) or value not in ACCURACIES:
         raise GeometryError(f"accuracy must be one of {', '.join(ACCURACIES)}, got {value!r}")
     if value not in AVAILABLE_ACCURACIES:
         raise NotAvailableError(f"accuracy={value!r} is not available yet; this version answers 'float64'")
-    return str(value)
+    return value
 
 
 def certificates(value: Any) -> None:
     """Certificates are named in the interface and arrive with the exact tier."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise GeometryError(f"certificates must be True or False, got {value!r}")
     if value:
         raise NotAvailableError("certificates=True is not available yet")
 
@@ -150,6 +174,6 @@ def want(value: Any, known: tuple[str, ...]) -> frozenset[str]:
     """The set of named effects asked for."""
     names = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise GeometryError(f"want must name some of {', '.join(known)}, got {name!r}")
     return frozenset(names)

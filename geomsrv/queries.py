@@ -354,7 +354,7 @@ def _anchors(side: Boxes | Polytopes | Frustum) -> FloatArray:
 
 def _relative_vertices(side: Boxes | Polytopes | Frustum, anchor: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
     """Vertices of every item relative to its anchor, and offsets; one item against n anchors becomes n items."""
-    count = max(_length(side), len(anchor))
+    count = len(anchor) if _length(side) == 1 else _length(side)
     if isinstance(side, Polytopes):
         sizes = np.diff(side.offsets)
         if len(side) == 1:
@@ -380,10 +380,10 @@ def _common_length(a: int, b: int) -> int:
 
 def _velocities(value: ArrayLike, name: str, count: int, dimension: int) -> FloatArray:
     """(n, d) or (d,) -> (n, d) or (1, d)."""
-    array = np.asarray(value)
-    rows = _validate.floats(array, name, (dimension,) if array.ndim == 1 else (None, dimension)).reshape(-1, dimension)
+    given = _validate.array(value, name)
+    rows = _validate.floats(given, name, (dimension,) if given.ndim == 1 else (None, dimension)).reshape(-1, dimension)
     if len(rows) not in (1, count):
-        raise GeometryError(f"{name} must have shape ({dimension},) or ({count}, {dimension}), got {array.shape}")
+        raise GeometryError(f"{name} must have shape ({dimension},) or ({count}, {dimension}), got {given.shape}")
     return rows
 
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shapes: validated, immutable values.  No query lives here.
 
-Batches in world coordinates (`Boxes`, `Polygons`, `Polytopes`), one-off shapes in their own frame (`Sphere`, `Box`,
-`Convex`, ...), and the view `Frustum`, which is both.  The numbers are taken literally: a box is the convex hull of
-center +- e_i * axes_i even where the axes are not perfectly orthonormal.
+Batches in world coordinates (`Boxes`, `Polygons`, `Polytopes`), one-off shapes in their own frame (`Sphere`,
+`Box`, `Convex`, ...), and the view `Frustum`, which is both.  The numbers are taken literally: a box is the
+convex hull of center +- e_i * axes_i even where the axes are not perfectly orthonormal.
 """
 
 from __future__ import annotations
@@ -49,21 +49,19 @@ CORNER_SIGNS = np.array([[2.0 * (i >> k & 1) - 1.0 for k in range(3)] for i in r
 
 
 def _freeze(value: Any, **arrays: Any) -> None:
-    """Set fields of a frozen dataclass; arrays become read-only, so a shape never changes under a query."""
+    """Set fields of a frozen dataclass; arrays become read-only copies: no shape changes under a query."""
     for name, array in arrays.items():
         if isinstance(array, np.ndarray):
-            # A view would let the caller's array change the shape from outside.
-            array = array.copy() if not array.flags.owndata or array.flags.writeable else array
+            # Always a copy: even the owner of a read-only array can make it writeable again.
+            array = array.copy()
             array.setflags(write=False)
         object.__setattr__(value, name, array)
 
 
-# ---------------------------------------------------------------------------------------------------- view frusta
+# ------------------------------------------------------------------------------------------------ view frusta
 
 
-def _window(
-    left: Any, up: Any, bounds: Any, names: tuple[str, ...]
-) -> tuple[float, ...]:
+def _window(left: Any, up: Any, bounds: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Half widths, or the off-centre bounds, as (l0, l1[, u0, u1])."""
     halves = (left, up)[: len(names)]
     if bounds is None:
@@ -77,7 +75,9 @@ def _window(
     window = _validate.floats(bounds, "bounds", (2 * len(names),))
     for k in range(len(names)):
         if not window[2 * k] < window[2 * k + 1]:
-            raise GeometryError(f"bounds[{2 * k}] must be < bounds[{2 * k + 1}], got {window[2 * k]}, {window[2 * k + 1]}")
+            raise GeometryError(
+                f"bounds[{2 * k}] must be < bounds[{2 * k + 1}], got {window[2 * k]}, {window[2 * k + 1]}"
+            )
     return tuple(float(x) for x in window)
 
 
@@ -117,8 +117,8 @@ class Frustum:
 
     References
     ----------
-    Eberly, *Intersection of Orthogonal View Frustum and Oriented Bounding Box* (2000), section 3; off-centre windows
-    are ours.
+    Eberly, *Intersection of Orthogonal View Frustum and Oriented Bounding Box* (2000), section 3; off-centre
+    windows are ours.
 
     Examples
     --------
@@ -158,7 +158,14 @@ class Frustum:
 
     @classmethod
     def look_at(
-        cls, eye: ArrayLike, target: ArrayLike, up: ArrayLike, fov_y: float, aspect: float, near: float, far: float
+        cls,
+        eye: ArrayLike,
+        target: ArrayLike,
+        up: ArrayLike,
+        fov_y: float,
+        aspect: float,
+        near: float,
+        far: float,
     ) -> Frustum:
         """Frustum of a camera at `eye` that looks at `target`.
 
@@ -188,9 +195,9 @@ class Frustum:
             raise GeometryError(f"fov_y must be < pi, got {angle}")
         ratio = _validate.scalar(aspect, "aspect", positive=True)
         near_depth, far_depth = _depths(near, far)
-        view = end - start
-        if not view.any():
+        if (start == end).all():
             raise GeometryError("target must differ from eye")
+        view = end / 2.0 - start / 2.0  # halved, so that the difference cannot overflow
         view = view / np.abs(view).max()
         view = view / np.linalg.norm(view)
         if not upward.any():
@@ -237,7 +244,7 @@ class Frustum:
             raise GeometryError(f"K must have positive focal lengths, got fx={fx}, fy={fy}")
         if skew != 0.0 or shear != 0.0 or tuple(last) != (0.0, 0.0, 1.0):
             raise GeometryError("K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; skew is not supported")
-        pose = np.asarray(X_world_camera)
+        pose = _validate.array(X_world_camera, "X_world_camera")
         if pose.ndim == 1:
             pose = _validate.poses(pose, "X_world_camera")
             position, rotation = pose[0, :3], _validate.rotation_matrices(pose[:, 3:])[0]
@@ -245,9 +252,14 @@ class Frustum:
             pose = _validate.floats(pose, "X_world_camera", (4, 4))
             if tuple(pose[3]) != (0.0, 0.0, 0.0, 1.0):
                 raise GeometryError("X_world_camera must have last row 0 0 0 1")
-            position, rotation = pose[:3, 3], pose[:3, :3]
+            position, rotation = pose[:3, 3], _validate.axes(pose[:3, :3], "X_world_camera[:3, :3]", (3, 3))
         right, down, forward = rotation.T
-        window = (near_depth * (cx - wide) / fx, near_depth * cx / fx, near_depth * (cy - high) / fy, near_depth * cy / fy)
+        window = (
+            near_depth * (cx - wide) / fx,
+            near_depth * cx / fx,
+            near_depth * (cy - high) / fy,
+            near_depth * cy / fy,
+        )
         return cls(position, [-right, -down, forward], near=near_depth, far=far_depth, bounds=window)
 
     def packed(self) -> FloatArray:
@@ -255,9 +267,9 @@ class Frustum:
         return np.concatenate([self.origin, self.axes.ravel(), self.bounds, [self.near, self.far]])
 
     def corners(self, origin: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-        """Corners relative to `origin`, by default the world's, rounded: (8, 3) for one origin, (n, 8, 3) for (n, 3).
+        """Corners relative to `origin`, by default the world's, rounded.
 
-        The four of the near plane come first.
+        (8, 3) for one origin, (n, 8, 3) for (n, 3).  The four of the near plane come first.
         """
         l0, l1, u0, u1 = self.bounds
         near = np.array([[x, y, self.near] for y in (u0, u1) for x in (l0, l1)])
@@ -325,7 +337,7 @@ class Frustum2D:
         return np.concatenate([self.origin, self.axes.ravel(), self.bounds, [self.near, self.far]])
 
 
-# ---------------------------------------------------------------------------------------- batches, world coordinates
+# --------------------------------------------------------------------------------- batches, world coordinates
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -372,7 +384,7 @@ class Boxes:
         array([[1., 2., 3.]])
         """
         rows = _validate.poses(poses, "poses")
-        half = np.asarray(half_extents)
+        half = _validate.array(half_extents, "half_extents")
         if half.ndim == 1:
             half = np.broadcast_to(_validate.floats(half, "half_extents", (3,)), (len(rows), 3))
         return cls(rows[:, :3], np.swapaxes(_validate.rotation_matrices(rows[:, 3:]), 1, 2), half)
@@ -406,7 +418,11 @@ class _Ragged:
     @classmethod
     def from_list(cls, items: Iterable[ArrayLike]) -> Any:
         """Batch of the listed vertex arrays."""
-        arrays = [_validate.floats(item, f"items[{i}]", (None, cls.dimension)) for i, item in enumerate(items)]
+        if not isinstance(items, Iterable):
+            raise GeometryError(f"items must be a list of vertex arrays, got {type(items).__name__}")
+        arrays = [
+            _validate.floats(item, f"items[{i}]", (None, cls.dimension)) for i, item in enumerate(items)
+        ]
         ends = np.cumsum([0, *(len(array) for array in arrays)], dtype=np.int64)
         return cls(np.concatenate([np.zeros((0, cls.dimension)), *arrays]), ends)  # type: ignore[call-arg]
 
@@ -418,7 +434,8 @@ class Polygons(_Ragged):
     Parameters
     ----------
     vertices : (m, 2) float
-        Counter-clockwise rings, end to end [m].  Repeated and collinear vertices, segments and single points are valid.
+        Counter-clockwise rings, end to end [m].  Repeated and collinear vertices, segments and single points
+        are valid.
     offsets : (n + 1,) int
         Ring i is ``vertices[offsets[i]:offsets[i + 1]]``.
 
@@ -479,7 +496,7 @@ class Polytopes(_Ragged):
         _freeze(self, vertices=points, offsets=_validate.offsets(offsets, "offsets", len(points), 1))
 
 
-# ------------------------------------------------------------------------------------ single shapes, their own frame
+# ----------------------------------------------------------------------------- single shapes, their own frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -516,7 +533,7 @@ class _Round(Shape):
 
 
 class Capsule(_Round):
-    """All points within `radius` of the segment z = -length/2 to +length/2; `length` is the cylindrical part."""
+    """All points within `radius` of the segment z = -length/2 to +length/2, the cylinder part."""
 
     kind: ClassVar[str] = "capsule"
 
@@ -575,8 +592,13 @@ class HalfSpace(Shape):
         largest = float(np.abs(direction).max())
         if largest == 0.0:
             raise GeometryError("normal must not be zero")
-        length = largest * float(np.linalg.norm(direction / largest))
-        _freeze(self, normal=direction / length, offset=level / length)
+        # Scaled first: the squares of a huge or tiny normal would overflow or vanish.
+        scaled = direction / largest
+        length = float(np.linalg.norm(scaled))
+        distance = level / largest / length
+        if not np.isfinite(distance):
+            raise GeometryError(f"offset / |normal| must be finite, got {level} / |{direction.tolist()}|")
+        _freeze(self, normal=scaled / length, offset=distance)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -603,13 +625,15 @@ class Mesh(Shape):
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
         points = _validate.floats(vertices, "vertices", (None, 3))
-        faces = np.asarray(triangles)
+        faces = _validate.array(triangles, "triangles")
         if faces.dtype.kind not in "iu" or faces.ndim != 2 or faces.shape[1] != 3:
             raise GeometryError(f"triangles must be (k, 3) integers, got {faces.dtype} {faces.shape}")
         wrong = (faces < 0) | (faces >= len(points))
         if wrong.any():
             i = int(np.argmax(wrong.any(axis=1)))
-            raise GeometryError(f"triangles[{i}] refers to a vertex outside 0..{len(points) - 1}: {faces[i].tolist()}")
+            raise GeometryError(
+                f"triangles[{i}] refers to a vertex outside 0..{len(points) - 1}: {faces[i].tolist()}"
+            )
         _freeze(self, vertices=points, triangles=faces.astype(np.int64))
 
 
@@ -665,7 +689,7 @@ class Polygon(Shape):
         _freeze(self, vertices=points)
 
 
-# ------------------------------------------------------------------------------------------- what the engine reads
+# -------------------------------------------------------------------------------------- what the engine reads
 
 
 class PackedShapes(NamedTuple):
