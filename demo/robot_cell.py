@@ -1,0 +1,478 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Demo: a geomsrv node in one process, this client in another, a Panda on a table between them.
+
+Publishes the world, streams a moving obstacle, polygons and a camera, asks the node the three questions, listens to
+its topics, prints what it answered and writes a picture.  Exit status 0 only if every answer arrived, agrees with what
+the world was built to give, and the cross-check against FCL found no unexplained difference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import array
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+# Before rclpy: stay on this machine, and apart from whatever else runs on it.
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+
+import cell  # noqa: E402
+import numpy as np  # noqa: E402
+import picture  # noqa: E402
+import rclpy  # noqa: E402
+from geometry_msgs.msg import Point32, PolygonInstanceStamped  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data  # noqa: E402
+from rich.console import Console  # noqa: E402
+from rich.table import Table  # noqa: E402
+from sensor_msgs.msg import CameraInfo  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+
+import geomsrv as gs  # noqa: E402
+from geomsrv import msg as gm  # noqa: E402
+from geomsrv import srv as gv  # noqa: E402
+from geomsrv.ros import convert  # noqa: E402
+
+ANSWER_DEADLINE_S = 20.0
+HORIZON_S = 5.0
+MAX_DISTANCE_M = 0.5
+TIMED_CALLS = 50
+LATCHED = QoSProfile(
+    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+STATE = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class DemoFailure(Exception):
+    """The demo did not get what it was promised; the message says what."""
+
+
+class Client:
+    """Publishers, subscriptions and service clients of the demo, spinning in a thread of their own."""
+
+    def __init__(self) -> None:
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self.node = Node("geomsrv_demo", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._news = threading.Condition()
+        self.latest: dict[str, Any] = {}
+        self.shapes = self.node.create_publisher(gm.SceneUpdate, "/geomsrv/shapes", LATCHED)
+        self.states = self.node.create_publisher(gm.ShapeStates, "/geomsrv/states", BEST_EFFORT)
+        self.polygons = self.node.create_publisher(PolygonInstanceStamped, "/geomsrv/polygons", 10)
+        self.camera = self.node.create_publisher(CameraInfo, "/geomsrv/camera_info", qos_profile_sensor_data)
+        for kind, topic, qos in (
+            (gm.ContactArray, "contacts", 10),
+            (gm.DistanceArray, "distances", 10),
+            (gm.VisibleArray, "visible", 10),
+            (gm.EngineState, "state", STATE),
+        ):
+            self.node.create_subscription(kind, f"/geomsrv/{topic}", self._keep(topic), qos)
+        self._services = {
+            name: self.node.create_client(kind, f"/geomsrv/{name}")
+            for name, kind in (
+                ("cull", gv.Cull),
+                ("distance", gv.Distance),
+                ("first_contact", gv.FirstContact),
+                ("get_scene", gv.GetScene),
+                ("self_check", Trigger),
+            )
+        }
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._thread.start()
+
+    def _keep(self, topic: str) -> Callable[[Any], None]:
+        def keep(message: Any) -> None:
+            with self._news:
+                self.latest[topic] = message
+                self._news.notify_all()
+
+        return keep
+
+    def wait_for_node(self) -> None:
+        """Until every service is there."""
+        for name, client in self._services.items():
+            if not client.wait_for_service(ANSWER_DEADLINE_S):
+                raise DemoFailure(f"service ~/{name} did not appear within {ANSWER_DEADLINE_S:g} s")
+
+    def wait_for(self, topic: str, what: str, condition: Callable[[Any], bool]) -> Any:
+        """The latest message on `topic` that meets `condition`."""
+        with self._news:
+            if not self._news.wait_for(
+                lambda: topic in self.latest and condition(self.latest[topic]), ANSWER_DEADLINE_S
+            ):
+                raise DemoFailure(f"no message on ~/{topic} within {ANSWER_DEADLINE_S:g} s: {what}")
+            return self.latest[topic]
+
+    def call(self, name: str, request: Any) -> Any:
+        """The response of a service; a refusal is a failure of the demo."""
+        future = self._services[name].call_async(request)
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(ANSWER_DEADLINE_S):
+            raise DemoFailure(f"service ~/{name} did not answer within {ANSWER_DEADLINE_S:g} s")
+        response = future.result()
+        if getattr(response, "status", 0) != 0:
+            raise DemoFailure(f"service ~/{name} refused: {response.message}")
+        return response
+
+    def time_calls(self, name: str, request: Any) -> float:
+        """Median milliseconds of a call."""
+        times = []
+        for _ in range(TIMED_CALLS):
+            start = time.perf_counter()
+            self.call(name, request)
+            times.append(1e3 * (time.perf_counter() - start))
+        return statistics.median(times)
+
+    def close(self) -> None:
+        """Stop spinning and leave."""
+        self._executor.shutdown()
+        self._thread.join(5.0)
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+class Stream:
+    """Publishes the obstacle's state, the polygons and the camera until stopped, as sensors would."""
+
+    PERIOD_S = 0.02
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._start = client.node.get_clock().now()
+        self._thread.start()
+
+    def _run(self) -> None:
+        tick = 0
+        while not self._stop.wait(self.PERIOD_S):
+            now = self._client.node.get_clock().now()
+            elapsed = (now - self._start).nanoseconds * 1e-9
+            self._client.states.publish(self._state(now, elapsed))
+            if tick % 5 == 0:
+                for mover in cell.MOVERS:
+                    self._client.polygons.publish(self._polygon(mover, now, elapsed))
+                self._client.camera.publish(self._camera(now))
+            tick += 1
+
+    @staticmethod
+    def _state(now: Any, elapsed: float) -> gm.ShapeStates:
+        # The obstacle comes in for two seconds, then starts over.
+        position = np.add(cell.OBSTACLE_START, np.multiply(cell.OBSTACLE_VELOCITY, elapsed % 2.0))
+        message = gm.ShapeStates(ids=[cell.OBSTACLE])
+        message.header.stamp, message.header.frame_id = now.to_msg(), "world"
+        message.poses = array.array("d", [*position, *cell.LYING])
+        message.twists = array.array("d", [*cell.OBSTACLE_VELOCITY, 0.0, 0.0, 0.0])
+        return message
+
+    @staticmethod
+    def _polygon(mover: cell.Mover, now: Any, elapsed: float) -> PolygonInstanceStamped:
+        # They start over every second, so that the scene at any time is much like the picture's.
+        ring = mover.ring + np.multiply(mover.velocity, elapsed % 1.0)
+        message = PolygonInstanceStamped()
+        message.header.stamp, message.header.frame_id = now.to_msg(), "world"
+        message.polygon.id = mover.number
+        message.polygon.polygon.points = [Point32(x=float(x), y=float(y), z=0.0) for x, y in ring]
+        return message
+
+    @staticmethod
+    def _camera(now: Any) -> CameraInfo:
+        message = CameraInfo(width=cell.WIDTH, height=cell.HEIGHT)
+        message.header.stamp, message.header.frame_id = now.to_msg(), cell.CAMERA_FRAME
+        message.k = np.ravel(cell.INTRINSICS)
+        message.p = np.ravel(np.hstack([cell.INTRINSICS, np.zeros((3, 1))]))
+        message.r = np.eye(3).ravel()
+        return message
+
+    def stop(self) -> None:
+        """Stop publishing."""
+        self._stop.set()
+        self._thread.join(5.0)
+
+
+def start_node() -> subprocess.Popen[bytes]:
+    """The node as a process of its own."""
+    parameters = {
+        "cross_check.mode": "all",
+        "horizon": HORIZON_S,
+        "max_distance": MAX_DISTANCE_M,
+        "camera.frame": cell.CAMERA_FRAME,
+        "camera.near": cell.NEAR,
+        "camera.far": cell.FAR,
+        "camera.pose": [float(x) for x in cell.camera_pose()],
+    }
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from geomsrv.cli import main; sys.exit(main())",
+        "node",
+        "--ros-args",
+    ]
+    for name, value in parameters.items():
+        command += ["-p", f"{name}:={value}"]
+    command += ["--log-level", "warn"]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL)
+
+
+def scene_message(objects: Sequence[gs.SceneObject], allowed: Sequence[tuple[str, str]]) -> gm.SceneUpdate:
+    """The world as one update."""
+    message = gm.SceneUpdate(clear=True)
+    message.header.frame_id = "world"
+    for item in objects:
+        message.add.append(gm.SceneObject())
+        convert.set_object(message.add[-1], item)
+    message.allow_a, message.allow_b = [a for a, _ in allowed], [b for _, b in allowed]
+    return message
+
+
+def show_visible(console: Console, response: Any) -> None:
+    """What the camera sees."""
+    table = Table(title="Visible", title_justify="left")
+    table.add_column("state")
+    table.add_column("objects")
+    for state in (gs.INSIDE, gs.INTERSECTS):
+        names = [name for name, s in zip(response.ids, response.states, strict=True) if s == state]
+        table.add_row(state.name, ", ".join(names) or "-")
+    unseen = sum(s == gs.OUTSIDE for s in response.states)
+    table.add_row(gs.OUTSIDE.name, f"{unseen} of {len(response.ids)}")
+    console.print(table)
+
+
+def show_distances(console: Console, response: Any, ours: set[str]) -> int:
+    """Contacts now and the robot's clearances; returns the row of the robot's nearest pair."""
+    table = Table(title="Distance", title_justify="left")
+    for heading in ("pair", "distance [mm]", "proven interval [mm]"):
+        table.add_column(heading, justify="left" if heading == "pair" else "right")
+    order = np.argsort(np.asarray(response.distance), kind="stable").tolist()
+    robot_rows = [i for i in order if len({response.ids_a[i], response.ids_b[i]} & ours) == 1]
+    if not robot_rows:
+        raise DemoFailure(f"no object within {MAX_DISTANCE_M:g} m of the robot")
+    touching = [i for i in order if response.distance[i] <= 0.0]
+    for i in [*touching, *robot_rows[:4]]:
+        low, high = 1e3 * response.lower[i], 1e3 * response.upper[i]
+        bounds = f"[{low:.9f}, {high:.9f}]" if low else f"[0, {high:.3g}]"
+        table.add_row(
+            f"{response.ids_a[i]} - {response.ids_b[i]}", f"{1e3 * response.distance[i]:.6f}", bounds
+        )
+    console.print(table)
+    return int(robot_rows[0])
+
+
+def show_contacts(console: Console, response: Any) -> list[picture.PlannedContact]:
+    """Who touches whom when and where, in the plane; returns what will be drawn."""
+    names = {mover.id: mover.name for mover in cell.MOVERS}
+    table = Table(title=f"First contact within {HORIZON_S:g} s", title_justify="left")
+    for heading in ("pair", "outcome", "time [s]", "proven width [s]", "contact set [m]"):
+        table.add_column(heading)
+    planned = []
+    for i, (a, b) in enumerate(zip(response.ids_a, response.ids_b, strict=True)):
+        status = gs.ContactStatus(response.item_status[i])
+        begin, end = response.point_offsets[i], response.point_offsets[i + 1]
+        points = np.reshape(response.points, (-1, 3))[begin:end]
+        where = "  ".join(f"({x:.3f}, {y:.3f}, {z:.3f})" for x, y, z in points[:2])
+        width = response.time_upper[i] - response.time_lower[i]
+        if status == gs.WILL_TOUCH or names.keys() & {a, b}:
+            table.add_row(
+                f"{names.get(a, a)} - {names.get(b, b)}",
+                status.name,
+                f"{response.time[i]:.6f}",
+                f"{width:.1e}",
+                where,
+            )
+        if status == gs.WILL_TOUCH and {a, b} <= names.keys():
+            normal = np.asarray(response.normal[3 * i : 3 * i + 2])
+            planned.append(
+                picture.PlannedContact(names[a], names[b], response.time[i], points[:, :2], normal)
+            )
+    console.print(table)
+    unsupported = sum(s == gs.ContactStatus.UNSUPPORTED for s in response.item_status)
+    if unsupported:
+        console.print(
+            f"{unsupported} pairs of moving solids: unsupported in this version, by name in the answer\n"
+        )
+    return planned
+
+
+def show_cross_check(console: Console, state: Any) -> None:
+    """The tally of FCL beside the engine."""
+    table = Table(title=f"Cross-check against FCL: {state.cross_check_status or state.cross_check_mode}")
+    table.title_justify = "left"
+    columns = ("kind", "agreed", "explained", "unexplained", "skipped")
+    for heading in columns:
+        table.add_column(heading, justify="left" if heading == "kind" else "right")
+    for row in zip(
+        *(getattr(state, f"cross_check_{'kinds' if c == 'kind' else c}") for c in columns), strict=True
+    ):
+        table.add_row(*map(str, row))
+    console.print(table)
+
+
+def run(console: Console, path: Path) -> None:
+    """The demo; raises DemoFailure where it does not get what it was promised."""
+    start = time.perf_counter()
+    panda = cell.robot()
+    links = panda.objects(cell.JOINTS)
+    furniture = cell.furniture()
+    world = [*links, *furniture]
+    allowed = cell.allowed_pairs(panda)
+    console.print(
+        f"Panda: {len(links)} collision geometries, {sum(len(o.shape.vertices) for o in links if isinstance(o.shape, gs.Convex))}"
+        f" hull vertices, {len(panda.allowed_pairs)} allowed pairs; {len(furniture)} other objects\n"
+    )
+    client = Client()
+    stream = None
+    try:
+        client.wait_for_node()
+        client.shapes.publish(scene_message(world, allowed))
+        client.wait_for("state", "the scene's objects", lambda m: m.object_count >= len(world))
+        stream = Stream(client)
+        everything = len(world) + len(cell.MOVERS)
+        client.wait_for("state", "the polygons' objects", lambda m: m.object_count >= everything)
+        visible = client.wait_for("visible", "what the camera sees", lambda m: len(m.ids) > 0)
+        contacts = client.wait_for(
+            "contacts", "a predicted contact", lambda m: any(c.status == c.WILL_TOUCH for c in m.contacts)
+        )
+        stream.stop()  # from here on the world stands still, so that all answers are about the same one
+
+        requests = {
+            "cull": gv.Cull.Request(select=gv.Cull.Request.ALL, view=gv.Cull.Request.CAMERA),
+            "distance": gv.Distance.Request(
+                select=gv.Distance.Request.ALL_PAIRS,
+                max_distance=MAX_DISTANCE_M,
+                want=["distance", "witness"],
+            ),
+            "first_contact": gv.FirstContact.Request(
+                select=gv.FirstContact.Request.ALL_PAIRS,
+                horizon=HORIZON_S,
+                want=["first_contact", "contact_set"],
+            ),
+        }
+        seen = client.call("cull", requests["cull"])
+        near = client.call("distance", requests["distance"])
+        meet = client.call("first_contact", requests["first_contact"])
+        checks = client.call("self_check", Trigger.Request())
+        if not checks.success:
+            raise DemoFailure(f"self check: {checks.message}")
+        scene = client.call("get_scene", gv.GetScene.Request())
+
+        show_visible(console, seen)
+        nearest = show_distances(console, near, set(panda.ids))
+        planned = show_contacts(console, meet)
+        tally = client.wait_for(
+            "state",
+            "the cross-check's tally",
+            lambda m: sum(m.cross_check_agreed) > 0 or m.cross_check_mode == "off",
+        )
+        show_cross_check(console, tally)
+        medians = {name: client.time_calls(name, request) for name, request in requests.items()}
+        console.print(
+            "Calls: "
+            + ", ".join(f"~/{name} {ms:.2f} ms" for name, ms in medians.items())
+            + f" (median of {TIMED_CALLS})"
+        )
+        console.print(
+            f"Topics: {len(visible.ids)} visible, {len(contacts.contacts)} contacts; self check: {checks.message}"
+        )
+        judge(seen, near, planned, tally)
+        points = np.reshape(near.point_a, (-1, 3)), np.reshape(near.point_b, (-1, 3))
+        now = {item.id: item for item in convert.update_from(scene.scene).add}
+        label = f"{near.ids_a[nearest]} - {near.ids_b[nearest]}\n{1e3 * near.distance[nearest]:.1f} mm"
+        picture.draw(
+            picture.Picture(
+                objects=[item for item in now.values() if not isinstance(item.shape, gs.Polygon)],
+                states=dict(zip(seen.ids, seen.states, strict=True)),
+                frustum=cell.camera_frustum(),
+                nearest=(points[0][nearest], points[1][nearest], label),
+                touching=[points[0][i] for i, d in enumerate(near.distance) if d <= 0.0],
+                footprints={
+                    mover.name: (
+                        now[mover.id].shape.vertices + now[mover.id].pose[:2],
+                        np.asarray(mover.velocity),
+                    )
+                    for mover in cell.MOVERS
+                },
+                planned=planned,
+            ),
+            path,
+        )
+    finally:
+        if stream is not None:
+            stream.stop()
+        client.close()
+    console.print(f"Picture: {path}   total {time.perf_counter() - start:.1f} s")
+
+
+def judge(seen: Any, near: Any, planned: Sequence[picture.PlannedContact], tally: Any) -> None:
+    """Whether the answers are those that this world was built to give."""
+    state = dict(zip(seen.ids, seen.states, strict=True))
+    if state.get("carton") == gs.OUTSIDE or gs.OUTSIDE not in state.values():
+        raise DemoFailure("the camera must see the carton, and not everything")
+    touching = {
+        frozenset(p)
+        for p, d in zip(zip(near.ids_a, near.ids_b, strict=True), near.distance, strict=True)
+        if d <= 0
+    }
+    expected = {frozenset((thing, "table")) for thing in ("carton", "ball", "bottle")}
+    if touching != expected:
+        raise DemoFailure(
+            f"what stands on the table must touch it, and nothing else; got {sorted(map(sorted, touching))}"
+        )
+    meetings = {frozenset((contact.id_a, contact.id_b)): len(contact.points) for contact in planned}
+    if (
+        meetings.get(frozenset(("cart", "footprint"))) != 2
+        or meetings.get(frozenset(("pallet", "footprint"))) != 1
+    ):
+        raise DemoFailure(
+            f"the cart must meet the footprint along an edge, the pallet in a point; got {meetings}"
+        )
+    if tally.cross_check_mode != "off" and sum(tally.cross_check_unexplained):
+        raise DemoFailure(
+            f"the cross-check found {sum(tally.cross_check_unexplained)} unexplained differences"
+        )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Start the node, run the demo, stop the node."""
+    parser = argparse.ArgumentParser(
+        prog="geomsrv demo", description="A Panda on a table, a node and a client."
+    )
+    parser.add_argument(
+        "--picture", type=Path, default=Path("demo_output/robot_cell.png"), help="where to write it"
+    )
+    arguments = parser.parse_args(argv)
+    console = Console(width=120)
+    node = start_node()
+    try:
+        run(console, arguments.picture)
+    except DemoFailure as failure:
+        console.print(f"[red]FAILED[/red]: {failure}")
+        return 1
+    finally:
+        node.send_signal(signal.SIGINT)
+        try:
+            node.wait(10.0)
+        except subprocess.TimeoutExpired:
+            node.kill()
+            node.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
