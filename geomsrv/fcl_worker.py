@@ -1,0 +1,179 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""The process in which FCL runs: reads pairs from stdin, writes what FCL says of each to stdout.
+
+Started as a script by `geomsrv._fcl_process`, so it loads neither the package nor the engine.  It is built to
+be lost: FCL can abort, hang or segfault, and whatever it does ends this process and nothing else.
+
+Of FCL only ``collide()`` and the unsigned ``distance()`` are called.  Signed distance aborts (uncaught
+``std::logic_error``), hangs (concentric spheres, coaxial capsules) and segfaults (half spaces); the unsigned
+distance of a half space segfaults, too, so half spaces get ``collide()`` only.
+
+Messages, both ways: a tag byte and the payload's size (`HEADER`), then the payload.
+
+==== ========= ===============================================================================================
+tag  direction payload
+==== ========= ===============================================================================================
+H    out       once, first: FCL is loaded; its version
+E    out       once, first and last: FCL cannot be loaded; why
+D    in        one shape: `DEFINITION`, then the vertices, float64
+F    in        forget all shapes; empty
+P    in        pairs: `REQUEST` rows; answered by one `REPLY` row each, bare, as soon as it is known
+==== ========= ===============================================================================================
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+import sys
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+HEADER = struct.Struct("<cq")
+DEFINITION = struct.Struct("<q16s4d")  # id, kind, the four parameters of `geomsrv.shapes.pack`
+REQUEST = np.dtype([("a", "<i8"), ("b", "<i8"), ("pose", "<f8", 7)])
+REPLY = np.dtype([("outcome", "u1"), ("distance", "<f8")])
+
+KINDS = ("sphere", "capsule", "box", "convex", "half_space")  #: shapes that FCL is asked about
+
+# Yields the processor to the process whose answers are checked; the check is never urgent.
+NICENESS = 10
+
+
+class Outcome(IntEnum):
+    """What became of one pair."""
+
+    APART = 0  #: the reply holds the distance, or NaN for half spaces
+    CONTACT = 1
+    FAILED = 2  #: python-fcl raised, or answered NaN
+
+
+class Fcl:
+    """Shapes by id, and what FCL says of two of them."""
+
+    def __init__(self) -> None:
+        import fcl
+
+        self.module = fcl
+        self.version = str(getattr(fcl, "__version__", "unknown"))
+        self._unsigned = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=False)
+        self._pending: dict[int, bytes] = {}
+        self._objects: dict[int, tuple[str, Any, Any]] = {}
+
+    def define(self, payload: bytes) -> None:
+        """Keep a shape; FCL's geometry is made on first use, under the clock of the pair that needs it."""
+        self._pending[DEFINITION.unpack_from(payload)[0]] = payload
+
+    def forget(self) -> None:
+        """Drop every shape."""
+        self._pending.clear()
+        self._objects.clear()
+
+    def _object(self, number: int) -> tuple[str, Any, Any]:
+        """(kind, object that stays at the origin, object that gets moved)."""
+        found = self._objects.get(number)
+        if found is None:
+            payload = self._pending.pop(number)
+            _, name, *params = DEFINITION.unpack_from(payload)
+            kind = name.rstrip(b"\0").decode()
+            geometry = self._geometry(
+                kind, params, np.frombuffer(payload, "<f8", offset=DEFINITION.size).reshape(-1, 3)
+            )
+            found = self._objects[number] = (kind, *(self.module.CollisionObject(geometry) for _ in range(2)))
+        return found
+
+    def _geometry(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
+        if kind == "sphere":
+            return self.module.Sphere(params[0])
+        if kind == "capsule":
+            return self.module.Capsule(params[0], 2.0 * params[1])
+        if kind == "box":
+            return self.module.Box(*(2.0 * half for half in params[:3]))
+        if kind == "half_space":
+            return self.module.Halfspace(np.array(params[:3]), params[3])
+        # Without faces FCL finds support points by looking at every vertex instead of walking along edges:
+        # the same answers, also for flat hulls, and nobody has to compute a hull.
+        return self.module.Convex(vertices, 0, np.zeros(0, np.int64))
+
+    def measure(self, a: int, b: int, pose: NDArray[np.float64]) -> tuple[int, float]:
+        """Outcome and distance of one pair, b placed by `pose` in the frame of a."""
+        kind_a, first, _ = self._object(a)
+        kind_b, _, second = self._object(b)
+        # ROS order x y z w -> FCL's w x y z.
+        second.setTransform(self.module.Transform(pose[[6, 3, 4, 5]], pose[:3]))
+        if self.module.collide(first, second):
+            return Outcome.CONTACT, np.nan
+        if "half_space" in (kind_a, kind_b):
+            return Outcome.APART, np.nan
+        gap = float(self.module.distance(first, second, self._unsigned))
+        if not gap < np.inf:
+            return Outcome.FAILED, gap
+        # -1 is FCL's word for a contact; collide() misses some between flat hulls.
+        return (Outcome.APART, gap) if gap > 0.0 else (Outcome.CONTACT, np.nan)
+
+
+def read_exactly(source: int, size: int) -> bytes:
+    """`size` bytes; b"" at the end of the stream."""
+    parts: list[bytes] = []
+    while size > 0:
+        part = os.read(source, size)
+        if not part:
+            return b""
+        parts.append(part)
+        size -= len(part)
+    return b"".join(parts)
+
+
+def answer(engine: Fcl, rows: NDArray[np.void], timeout_s: float, sink: int) -> None:
+    """Write one reply per row, each at once: what was written before a crash tells which pair did it."""
+    for row in rows:
+        # A hang inside FCL never returns to Python.  The default action of SIGALRM ends it, even if the
+        # parent is gone.
+        signal.setitimer(signal.ITIMER_REAL, timeout_s)
+        try:
+            outcome, gap = engine.measure(int(row["a"]), int(row["b"]), row["pose"])
+        except Exception as error:
+            print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
+            outcome, gap = Outcome.FAILED, np.nan
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        os.write(sink, np.array((outcome, gap), REPLY).tobytes())
+
+
+def main() -> None:
+    """Serve until stdin ends."""
+    timeout_s = float(sys.argv[1])
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
+    # FCL and libccd print to stdout; that must not end up between our rows.
+    sink = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    os.nice(NICENESS)
+    try:
+        engine = Fcl()
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}".encode()
+        os.write(sink, HEADER.pack(b"E", len(text)) + text)
+        return
+    version = engine.version.encode()
+    os.write(sink, HEADER.pack(b"H", len(version)) + version)
+    source = sys.stdin.fileno()
+    while header := read_exactly(source, HEADER.size):
+        tag, size = HEADER.unpack(header)
+        payload = read_exactly(source, size)
+        if len(payload) < size:
+            return
+        if tag == b"D":
+            engine.define(payload)
+        elif tag == b"F":
+            engine.forget()
+        else:
+            answer(engine, np.frombuffer(payload, REQUEST), timeout_s, sink)
+
+
+if __name__ == "__main__":
+    main()
