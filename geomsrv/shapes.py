@@ -628,6 +628,8 @@ class Mesh(Shape):
         faces = _validate.array(triangles, "triangles")
         if faces.dtype.kind not in "iu" or faces.ndim != 2 or faces.shape[1] != 3:
             raise GeometryError(f"triangles must be (k, 3) integers, got {faces.dtype} {faces.shape}")
+        if len(faces) == 0:
+            raise GeometryError("triangles must hold at least one triangle")
         wrong = (faces < 0) | (faces >= len(points))
         if wrong.any():
             i = int(np.argmax(wrong.any(axis=1)))
