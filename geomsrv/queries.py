@@ -298,12 +298,24 @@ def distance(
 def intersects(
     a: Shape | Batch, b: Shape | Batch, poses_ab: ArrayLike | None = None, *, accuracy: str = "float64"
 ) -> Booleans:
-    """Whether bodies touch or overlap now; arguments as for `distance`.
+    """Whether bodies touch or overlap now.
+
+    Parameters
+    ----------
+    a, b, poses_ab
+        Bodies, as for `distance`.
+    accuracy : str
+        Tier; see the numerics page.
 
     Returns
     -------
     Booleans
         Closed bodies: touching is True.
+
+    Raises
+    ------
+    GeometryError
+        Names the argument, the index and the fault.
 
     Examples
     --------

@@ -417,7 +417,7 @@ class _Ragged:
 
     @classmethod
     def from_list(cls, items: Iterable[ArrayLike]) -> Any:
-        """Batch of the listed vertex arrays."""
+        """Batch of the vertex arrays listed in `items`, one (k, d) array each."""
         if not isinstance(items, Iterable):
             raise GeometryError(f"items must be a list of vertex arrays, got {type(items).__name__}")
         arrays = [
@@ -539,13 +539,13 @@ class Capsule(_Round):
 
 
 class Cylinder(_Round):
-    """Solid cylinder about z, from z = -length/2 to +length/2."""
+    """Solid cylinder of `radius` about z, from z = -`length`/2 to +`length`/2 [m]."""
 
     kind: ClassVar[str] = "cylinder"
 
 
 class Cone(_Round):
-    """Solid cone about z, base at -length/2, apex at +length/2."""
+    """Solid cone about z, base of `radius` at z = -`length`/2, apex at +`length`/2 [m]."""
 
     kind: ClassVar[str] = "cone"
 
