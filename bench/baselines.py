@@ -23,22 +23,16 @@ def numpy_cull(frustum: gs.Frustum, boxes: gs.Boxes) -> np.ndarray:
     edges = (boxes.axes @ axes.T) * boxes.half_extents[:, :, None]
     l0, l1, u0, u1 = frustum.bounds
     near, far = frustum.near, frustum.far
-    planes = np.array(
-        [[0, 0, -1], [0, 0, 1], [near, 0, -l1], [-near, 0, l0], [0, near, -u1], [0, -near, u0]], float
-    )
+    planes = np.array([[0, 0, -1], [0, 0, 1], [near, 0, -l1], [-near, 0, l0], [0, near, -u1], [0, -near, u0]], float)
     limit = np.array([-near, far, 0, 0, 0, 0])
     visible = (delta @ planes.T - np.abs(edges @ planes.T).sum(axis=1) <= limit).all(axis=1)
     todo = np.flatnonzero(visible)
     corners = np.array([[x, y, near] for x in (l0, l1) for y in (u0, u1)])
     corners = np.vstack([corners, corners * (far / near)])
-    sides = np.array(
-        [[1, 0, 0], [0, 1, 0], [l0, u0, near], [l0, u1, near], [l1, u0, near], [l1, u1, near]], float
-    )
+    sides = np.array([[1, 0, 0], [0, 1, 0], [l0, u0, near], [l0, u1, near], [l1, u0, near], [l1, u1, near]], float)
     e, d = edges[todo], delta[todo]
     normals = np.cross(e[:, [1, 2, 0]], e[:, [2, 0, 1]])
-    m = np.concatenate(
-        [normals, np.cross(sides[None, :, None], e[:, None]).reshape(len(todo), 18, 3)], axis=1
-    )
+    m = np.concatenate([normals, np.cross(sides[None, :, None], e[:, None]).reshape(len(todo), 18, 3)], axis=1)
     center = np.einsum("nak,nk->na", m, d)
     radius = np.abs(np.einsum("nak,nik->nai", m, e)).sum(axis=2)
     view = m @ corners.T
@@ -53,9 +47,7 @@ def numpy_distance_to_frustum(frustum: gs.Frustum, points: np.ndarray) -> np.nda
     z = (points - frustum.origin) @ frustum.axes[2]
     kr, ku = frustum.bounds[1] / frustum.near, frustum.bounds[3] / frustum.near
     t = np.maximum(z, (z + kr * x) / (1 + kr * kr))
-    t = np.maximum(
-        t, np.maximum((z + ku * y) / (1 + ku * ku), (z + kr * x + ku * y) / (1 + kr * kr + ku * ku))
-    )
+    t = np.maximum(t, np.maximum((z + ku * y) / (1 + ku * ku), (z + kr * x + ku * y) / (1 + kr * kr + ku * ku)))
     t = np.clip(t, frustum.near, frustum.far)
     return np.sqrt(np.maximum(x - kr * t, 0) ** 2 + np.maximum(y - ku * t, 0) ** 2 + (z - t) ** 2)
 

@@ -133,9 +133,7 @@ def _scene_scenarios(n: int) -> list[Scenario]:
     poses[:, :3] = rng.uniform(0.0, side, (n, 3))
     boxes = [gs.Box(h) for h in rng.uniform(0.02, 0.1, (n, 3))]
     scene.apply(
-        gs.SceneUpdate(
-            add=[gs.SceneObject(str(i), s, p) for i, (s, p) in enumerate(zip(boxes, poses, strict=True))]
-        )
+        gs.SceneUpdate(add=[gs.SceneObject(str(i), s, p) for i, (s, p) in enumerate(zip(boxes, poses, strict=True))])
     )
     ids = scene.ids
 
@@ -154,9 +152,7 @@ def print_table(console: Console, table: list[Scenario]) -> None:
     for s in table:
         ours = s.median_ns["ours"]
         ratio = {k: f"{s.median_ns[k] / ours:,.1f}" if k in s.median_ns else "" for k in ("numpy", "fcl")}
-        target = (
-            "" if s.target_ns is None else f"{s.target_ns:g} {'met' if ours <= s.target_ns else 'MISSED'}"
-        )
+        target = "" if s.target_ns is None else f"{s.target_ns:g} {'met' if ours <= s.target_ns else 'MISSED'}"
         out.add_row(s.name, f"{s.ours[1]:,}", f"{ours:,.1f}", target, ratio["numpy"], ratio["fcl"])
     console.print(out)
 

@@ -31,9 +31,7 @@ def boxes_half_visible(n: int = 100_000) -> tuple[gs.Frustum, gs.Boxes]:
     l0, l1, u0, u1 = frustum.bounds
     depth = rng.uniform(frustum.near, frustum.far, n)
     spread = np.where(np.arange(n) % 2 == 0, 1.0, 3.0)
-    lateral = (
-        np.column_stack([rng.uniform(l0, l1, n), rng.uniform(u0, u1, n)]) * spread[:, None] / frustum.near
-    )
+    lateral = np.column_stack([rng.uniform(l0, l1, n), rng.uniform(u0, u1, n)]) * spread[:, None] / frustum.near
     outside = (spread > 1.0) & (np.abs(lateral) < [l1 / frustum.near, u1 / frustum.near]).all(axis=1)
     depth[outside] += frustum.far
     local = np.column_stack([lateral * depth[:, None], depth])
