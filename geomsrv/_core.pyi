@@ -11,6 +11,8 @@ _U = NDArray[np.uint8]
 _B = NDArray[np.bool_]
 # distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
 _Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
+# which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
+_Stages = tuple[_U, _I]
 
 def first_nonfinite(values: _F) -> int: ...
 def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
@@ -37,7 +39,33 @@ def distance_boxes(
     half_extents_b: _F,
     penetration: bool,
 ) -> _Distances: ...
-def distance_polytopes(vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool) -> _Distances: ...
+def distance_boxes_stages(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
+    center_b: _F,
+    axes_b: _F,
+    half_extents_b: _F,
+    penetration: bool,
+) -> _Stages: ...
+def distance_polytopes(
+    vertices_a: _F,
+    offsets_a: _I,
+    error_a: _F,
+    vertices_b: _F,
+    offsets_b: _I,
+    error_b: _F,
+    penetration: bool,
+) -> _Distances: ...
+def distance_polytopes_stages(
+    vertices_a: _F,
+    offsets_a: _I,
+    error_a: _F,
+    vertices_b: _F,
+    offsets_b: _I,
+    error_b: _F,
+    penetration: bool,
+) -> _Stages: ...
 def shape_kinds() -> tuple[str, ...]: ...
 def supported_pairs() -> _B: ...
 def distance_pairs(
@@ -49,5 +77,14 @@ def distance_pairs(
     poses_ab: _F,
     penetration: bool,
 ) -> _Distances: ...
+def distance_pairs_stages(
+    kinds: _U,
+    params: _F,
+    vertices: _F,
+    offsets: _I,
+    pairs: _I,
+    poses_ab: _F,
+    penetration: bool,
+) -> _Stages: ...
 def overlapping_pairs(lower: _F, upper: _F) -> _I: ...
 def overlapping_pairs_between(lower_a: _F, upper_a: _F, lower_b: _F, upper_b: _F) -> _I: ...

@@ -21,7 +21,7 @@ from geomsrv.answers import (
     FirstContacts,
 )
 from geomsrv.errors import GeometryError
-from geomsrv.shapes import Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
+from geomsrv.shapes import CORNER_ERROR, Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -281,7 +281,8 @@ def distance(
         unsupported = (answer[6] == DistanceStatus.UNSUPPORTED).any()
         message = f"distance {a.kind}-{b.kind} is unsupported in this version" if unsupported else ""
     gap, lower, upper, point_a, point_b, normal, status = answer
-    counts = {s.name.lower(): int(k) for s, k in zip(DistanceStatus, np.bincount(status, minlength=3), strict=True) if k}
+    totals = np.bincount(status, minlength=len(DistanceStatus))
+    counts = {outcome.name.lower(): int(totals[outcome]) for outcome in DistanceStatus if totals[outcome]}
     return Distances(
         distance=gap,
         lower=lower,
@@ -338,21 +339,23 @@ def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:
     """The engine's answer for two batches in world coordinates."""
     _expect(a, (Boxes, Polygons, Polytopes, Frustum), "a")
     _expect(b, (Polygons,) if isinstance(a, Polygons) else (Boxes, Polytopes, Frustum), "b")
-    count = _common_length(_length(a), _length(b))
+    _common_length(_length(a), _length(b))
     if isinstance(a, Polygons):
         return _core.distance_polygons(a.vertices, a.offsets, b.vertices, b.offsets, penetration)
     if isinstance(a, Boxes) and isinstance(b, Boxes):
         return _core.distance_boxes(
             a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration
         )
-    # Coordinates are taken relative to a point of the pair, so that a far-away pair loses nothing.
+    if isinstance(a, Polytopes) and isinstance(b, Polytopes):
+        literal = [np.zeros(len(side)) for side in (a, b)]
+        return _core.distance_polytopes(
+            a.vertices, a.offsets, literal[0], b.vertices, b.offsets, literal[1], penetration
+        )
+    # Corners are rounded relative to a point of the pair, so that a far-away pair loses nothing.
     anchor = _anchors(b if _length(b) == 1 else a)
-    relative = [_relative_vertices(side, anchor) for side in (a, b)]
-    gap, lower, upper, point_a, point_b, normal, status = _core.distance_polytopes(
-        *relative[0], *relative[1], penetration
-    )
-    shift = np.broadcast_to(anchor, (count, 3))
-    return gap, lower, upper, point_a + shift, point_b + shift, normal, status
+    sides = (*_relative_vertices(a, anchor), *_relative_vertices(b, anchor))
+    gap, lower, upper, point_a, point_b, normal, status = _core.distance_polytopes(*sides, penetration)
+    return gap, lower, upper, point_a + anchor, point_b + anchor, normal, status
 
 
 def _anchors(side: Boxes | Polytopes | Frustum) -> FloatArray:
@@ -364,20 +367,30 @@ def _anchors(side: Boxes | Polytopes | Frustum) -> FloatArray:
     return side.origin[None]
 
 
-def _relative_vertices(side: Boxes | Polytopes | Frustum, anchor: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Vertices of every item relative to its anchor, and offsets; one item against n anchors becomes n items."""
-    count = len(anchor) if _length(side) == 1 else _length(side)
+def _relative_vertices(
+    side: Boxes | Polytopes | Frustum, anchor: FloatArray
+) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+    """Vertices relative to the anchors (n, 3), offsets, and how far rounding may have moved each item's vertices.
+
+    One item against n anchors becomes n items; one anchor serves all items.
+    """
     if isinstance(side, Polytopes):
         sizes = np.diff(side.offsets)
         if len(side) == 1:
             local = (side.vertices[None] - anchor[:, None]).reshape(-1, 3)
-            return local, np.arange(len(anchor) + 1) * sizes[0]
-        return side.vertices - np.repeat(np.broadcast_to(anchor, (count, 3)), sizes, axis=0), side.offsets
-    if isinstance(side, Boxes):
-        corners = side.corners(np.broadcast_to(anchor, (count, 3))) if len(side) > 1 else side.corners(anchor)
-    else:
-        corners = side.corners(anchor)
-    return np.ascontiguousarray(corners.reshape(-1, 3)), np.arange(len(corners) + 1) * 8
+            offsets = np.arange(len(anchor) + 1) * sizes[0]
+        else:
+            local = side.vertices - np.repeat(np.broadcast_to(anchor, (len(side), 3)), sizes, axis=0)
+            offsets = side.offsets
+        return local, offsets, CORNER_ERROR * np.maximum.reduceat(np.abs(local).max(axis=1), offsets[:-1])
+    corners = side.corners(np.broadcast_to(anchor, (max(_length(side), len(anchor)), 3)))
+    offsets = np.arange(len(corners) + 1) * 8
+    error = (
+        side.corner_error(anchor)
+        if isinstance(side, Frustum)
+        else CORNER_ERROR * np.abs(corners).max(axis=(1, 2), initial=0.0)
+    )
+    return np.ascontiguousarray(corners.reshape(-1, 3)), offsets, error
 
 
 def _length(side: Batch) -> int:

@@ -47,6 +47,10 @@ FloatArray = NDArray[np.float64]
 # Signs of the eight corners of a box, row i = bits of i (x fastest).
 CORNER_SIGNS = np.array([[2.0 * (i >> k & 1) - 1.0 for k in range(3)] for i in range(8)])
 
+# A rounded corner is off by less than this times its size.  A coordinate takes at most 7 roundings of numbers no larger
+# than the largest coordinate of any corner, of 1/2 eps each; three coordinates make 7/2 sqrt(3) eps.
+CORNER_ERROR = 8 * float(np.finfo(np.float64).eps)
+
 
 def _freeze(value: Any, **arrays: Any) -> None:
     """Set fields of a frozen dataclass; arrays become read-only copies: no shape changes under a query."""
@@ -275,6 +279,13 @@ class Frustum:
         near = np.array([[x, y, self.near] for y in (u0, u1) for x in (l0, l1)])
         local = np.concatenate([near, near * (self.far / self.near)]) @ self.axes
         return (self.origin - np.asarray(origin, dtype=np.float64))[..., None, :] + local
+
+    def corner_error(self, origin: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+        """How far rounding may have moved `corners` from the exact ones: scalar for one origin, (n,) for (n, 3)."""
+        l0, l1, u0, u1 = self.bounds
+        reach = (max(-l0, l1) + max(-u0, u1) + self.near) * (self.far / self.near)
+        shift = np.abs(self.origin - np.asarray(origin, dtype=np.float64)).max(axis=-1)
+        return CORNER_ERROR * (reach + shift)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -723,6 +734,7 @@ def pack(shapes: Sequence[Shape | Frustum]) -> PackedShapes:
             hull, kind = shape.vertices, Convex.kind
         elif isinstance(shape, Frustum):
             hull, kind = shape.corners(), Convex.kind
+            row[0] = shape.corner_error()
         kinds.append(_KIND_CODES[kind])
         vertices.append(hull)
     offsets = np.cumsum([len(hull) for hull in vertices], dtype=np.int64)

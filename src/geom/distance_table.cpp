@@ -1,0 +1,214 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/distance_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "geom/convex_convex.hpp"
+#include "geom/half_space_pairs.hpp"
+#include "geom/place.hpp"
+#include "geom/point_box.hpp"
+#include "geom/point_point.hpp"
+#include "geom/point_segment.hpp"
+#include "geom/segment_segment.hpp"
+
+namespace geomsrv {
+
+namespace {
+
+using Kernel = CoreSeparation (*)(const Placed& a, const Placed& b, bool penetration);
+
+CoreSeparation sphere_sphere(const Placed& a, const Placed& b, bool) { return point_point(a.core, b.core); }
+CoreSeparation sphere_capsule(const Placed& a, const Placed& b, bool) {
+    return point_segment(a.core, b.core);
+}
+CoreSeparation sphere_box(const Placed& a, const Placed& b, bool deep) {
+    return point_box(a.core, b.core, deep);
+}
+CoreSeparation capsule_capsule(const Placed& a, const Placed& b, bool) {
+    return segment_segment(a.core, b.core);
+}
+CoreSeparation general(const Placed& a, const Placed& b, bool deep) {
+    return convex_convex(a.core, b.core, deep);
+}
+CoreSeparation convex_half(const Placed& a, const Placed& b, bool) {
+    return convex_half_space(a.core, b.half_space);
+}
+CoreSeparation half_half(const Placed& a, const Placed& b, bool) {
+    return half_space_half_space(a.half_space, b.half_space);
+}
+CoreSeparation unsupported(const Placed&, const Placed&, bool) {
+    CoreSeparation out;
+    out.outcome = Outcome::unsupported;
+    out.point_a = out.point_b = out.normal = nan_vector();
+    return out;
+}
+
+// Upper triangle only: the caller orders the pair.  Rows and columns as in ShapeKind.
+// clang-format off
+constexpr Kernel kBelow = nullptr;
+constexpr Kernel kUnsup = unsupported;
+constexpr Kernel kKernels[kShapeKinds][kShapeKinds] = {
+    /*              sphere         capsule          box         convex   half_space   cylinder cone    ellipsoid mesh    polygon */
+    /*sphere    */ {sphere_sphere, sphere_capsule,  sphere_box, general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*capsule   */ {kBelow,        capsule_capsule, general,    general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*box       */ {kBelow,        kBelow,          general,    general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*convex    */ {kBelow,        kBelow,          kBelow,     general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*half_space*/ {kBelow,        kBelow,          kBelow,     kBelow,  half_half,   kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*cylinder  */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*cone      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kUnsup, kUnsup,   kUnsup, kUnsup},
+    /*ellipsoid */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kUnsup,   kUnsup, kUnsup},
+    /*mesh      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kBelow,   kUnsup, kUnsup},
+    /*polygon   */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kBelow,   kBelow, kUnsup},
+};
+// clang-format on
+
+constexpr bool triangle_is_full() {
+    for (std::size_t row = 0; row < kShapeKinds; ++row) {
+        for (std::size_t column = 0; column < kShapeKinds; ++column) {
+            if ((kKernels[row][column] == nullptr) != (column < row)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+static_assert(triangle_is_full(), "every pair of kinds has an entry above the diagonal, and none below");
+
+constexpr Kernel kernel_of(ShapeKind a, ShapeKind b) {
+    return kKernels[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
+}
+
+CoreSeparation swapped(CoreSeparation s) {
+    std::swap(s.point_a, s.point_b);
+    s.normal = -s.normal;
+    for (int i = 0; i < s.witness.count; ++i) {
+        std::swap(s.witness.a[i], s.witness.b[i]);
+    }
+    return s;
+}
+
+/// Back to the caller's unit.  Only a result below the normal range rounds: then away from the value.
+CoreSeparation unscaled(CoreSeparation s, double scale) {
+    if (scale == 1.0) {
+        return s;
+    }
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const double unit = 1.0 / scale;
+    s.value *= unit;
+    s.lower = std::nextafter(s.lower * unit, -kInfinity);
+    s.upper = std::nextafter(s.upper * unit, kInfinity);
+    s.point_a = unit * s.point_a;
+    s.point_b = unit * s.point_b;
+    return s;
+}
+
+/// The signed distance of the shapes from that of their cores.
+Separation with_radii(const CoreSeparation& core, double radius_a, double radius_b, Vec3 origin,
+                      bool penetration) {
+    Separation out;
+    if (core.outcome == Outcome::unsupported) {
+        out.point_a = out.point_b = out.normal = nan_vector();
+        return out;
+    }
+    out.outcome = core.outcome;
+    out.stage = core.stage;
+    out.iterations = core.iterations;
+    out.witness = core.witness;
+    const double radii = radius_a + radius_b;
+    // Each of the sum and the difference rounds by u.
+    const auto reduced = [&](double x, double direction) {
+        return radii == 0.0 ? x : x - radii + direction * 2 * kUnitRoundoff * (std::abs(x) + radii);
+    };
+    out.distance = core.value - radii;
+    out.lower = reduced(core.lower, -1.0);
+    out.upper = reduced(core.upper, 1.0);
+    out.normal = core.normal;
+    out.point_a = core.point_a + origin;
+    out.point_b = core.point_b + origin;
+    const bool apart = penetration || out.distance > 0.0;
+    if (apart && radii > 0.0) {
+        out.point_a = core.point_a + radius_a * core.normal + origin;
+        out.point_b = core.point_b - radius_b * core.normal + origin;
+    } else if (!apart) {
+        // A common point: of the cores, or on the way from one to the other where the balls about it overlap.
+        const double share = radii > 0.0 && core.value > 0.0 ? radius_a / radii : 0.0;
+        out.point_a = core.point_a + share * (core.point_b - core.point_a) + origin;
+        out.point_b = out.point_a;
+    }
+    if (!penetration) {
+        out.distance = std::max(out.distance, 0.0);
+        out.lower = std::max(out.lower, 0.0);
+        out.upper = std::max(out.upper, 0.0);
+    }
+    return out;
+}
+
+struct LocalPair {
+    Placed a;
+    Placed b;
+    double scale = 1.0;
+
+    double size() const { return a.core.reach + b.core.reach; }
+};
+
+/// Places the pair, in a larger or smaller unit of length where its sizes leave the range of the kernels.
+template <class Place, class Magnitude>
+LocalPair in_range_pair(LocalFrame frame, Place place_both, Magnitude magnitude) {
+    LocalPair pair = place_both(frame);
+    // Twice at most: numbers that overflow are first brought down to 1, and what then cancels is brought up
+    // again.
+    for (int tries = 0; tries < 2 && !in_range(pair.size()); ++tries) {
+        const bool finite = pair.size() <= std::numeric_limits<double>::max();
+        frame.scale *= scale_for(finite ? pair.size() : frame.scale * magnitude());
+        pair = place_both(frame);
+    }
+    pair.scale = frame.scale;
+    return pair;
+}
+
+}  // namespace
+
+bool supported_pair(ShapeKind a, ShapeKind b) { return kernel_of(std::min(a, b), std::max(a, b)) != kUnsup; }
+
+Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, bool penetration,
+                          double* scratch) {
+    const bool flip = a.kind > b.kind;
+    const Kernel kernel = flip ? kernel_of(b.kind, a.kind) : kernel_of(a.kind, b.kind);
+    // The origin is a point of a or, if a is unbounded, one of b: the plane's offset is then measured next to
+    // b.
+    const bool anchored_b = a.kind == ShapeKind::half_space && b.kind != ShapeKind::half_space;
+    LocalFrame frame;
+    frame.origin = anchored_b ? X_ab * middle_of(b) : middle_of(a);
+    const LocalPair pair = in_range_pair(
+        frame,
+        [&](const LocalFrame& f) {
+            return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
+        },
+        [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); });
+    const CoreSeparation core =
+        flip ? swapped(kernel(pair.b, pair.a, penetration)) : kernel(pair.a, pair.b, penetration);
+    return with_radii(unscaled(core, pair.scale), pair.a.radius, pair.b.radius, frame.origin, penetration);
+}
+
+Separation box_distance(const BoxView& a, const BoxView& b, bool penetration) {
+    LocalFrame frame;
+    frame.origin = a.center;
+    const LocalPair pair = in_range_pair(
+        frame,
+        [&](const LocalFrame& f) {
+            return LocalPair{{place_box(a.center, a.axes, a.half_extents, f), {}, 0.0},
+                             {place_box(b.center, b.axes, b.half_extents, f), {}, 0.0}};
+        },
+        [&] {
+            return std::max({largest_of(a.center), largest_of(a.half_extents), largest_of(b.center),
+                             largest_of(b.half_extents)});
+        });
+    return with_radii(unscaled(convex_convex(pair.a.core, pair.b.core, penetration), pair.scale), 0.0, 0.0,
+                      frame.origin, penetration);
+}
+
+}  // namespace geomsrv

@@ -1,0 +1,34 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Signed distance of any two shapes: places them, picks the kernel of the pair, adds the radii.
+#pragma once
+
+#include "geom/separation.hpp"
+#include "geom/shape.hpp"
+
+namespace geomsrv {
+
+/// Whether there is a kernel for a pair of kinds, in either order.
+bool supported_pair(ShapeKind a, ShapeKind b);
+
+/// Doubles of scratch memory that the pair needs.
+constexpr std::size_t scratch_size(const ShapeView& a, const ShapeView& b) {
+    return 3 * static_cast<std::size_t>(a.count + b.count);
+}
+
+/// Results in the frame of a; X_ab is the pose of b in a.  Overlapping shapes have distance 0, or minus their
+/// depth with `penetration`.  Unsupported pairs answer NaN.
+Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, bool penetration,
+                          double* scratch);
+
+/// A box by its centre, the rows A_i of `axes` and half sizes: the hull of center +- half_extents[i] * A_i.
+struct BoxView {
+    Vec3 center;
+    Mat3 axes;
+    Vec3 half_extents;
+};
+
+/// Results in the common frame of both boxes.
+Separation box_distance(const BoxView& a, const BoxView& b, bool penetration);
+
+}  // namespace geomsrv

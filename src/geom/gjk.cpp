@@ -1,0 +1,324 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/gjk.hpp"
+
+#include <cmath>
+#include <type_traits>
+
+#include "geom/double_double.hpp"
+
+namespace geomsrv {
+
+namespace {
+
+// Every step either shortens the vector or ends the loop, so there is no cycle; a few dozen steps are enough
+// for hulls of thousands of vertices, and what needs more than this is stuck in rounding.
+constexpr int kMaxSteps = 100;
+
+// Below this times the size, the two points are one as far as the rounding of their vertices can tell.
+constexpr double kContact = 8 * kUnitRoundoff;
+
+/// What differs between the two arithmetics.
+template <class T>
+struct Arithmetic;
+
+template <>
+struct Arithmetic<double> {
+    using Vec = Vec3;
+    // Side of the origin with respect to a face: 3 differences of length <= 2 S multiplied, with at most 16
+    // roundings.
+    static constexpr double kSideError = 128 * kUnitRoundoff;
+    static Vec from(Vec3 v) { return v; }
+    static Vec3 to_vec3(Vec v) { return v; }
+    static double to_double(double x) { return x; }
+    static Vec difference(Vec3 b, Vec3 a) { return b - a; }
+    static double root(double x) { return std::sqrt(x); }
+    static double absolute(double x) { return std::abs(x); }
+    static Vec divided(Vec v, double s) { return {v.x / s, v.y / s, v.z / s}; }
+};
+
+template <>
+struct Arithmetic<DoubleDouble> {
+    using Vec = WideVec3;
+    static constexpr double kSideError = 128 * kWideRoundoff;
+    static Vec from(Vec3 v) { return widen(v); }
+    static Vec3 to_vec3(Vec v) { return narrow(v); }
+    static double to_double(DoubleDouble x) { return x.hi; }
+    static Vec difference(Vec3 b, Vec3 a) { return exact_difference(b, a); }
+    static DoubleDouble root(DoubleDouble x) { return sqrt(x); }
+    static double absolute(DoubleDouble x) { return std::abs(x.hi); }
+    static Vec divided(Vec v, DoubleDouble s) { return {v.x / s, v.y / s, v.z / s}; }
+};
+
+/// A vertex of K: w = b - a.
+template <class T>
+struct Vertex {
+    int index_a = 0;
+    int index_b = 0;
+    Vec3 a;
+    Vec3 b;
+    typename Arithmetic<T>::Vec w;
+};
+
+template <class T>
+struct Simplex {
+    int count = 0;
+    Vertex<T> vertex[4];
+    T weight[4];  ///< of the point nearest to the origin
+};
+
+/// Point nearest to the origin on one vertex, edge or face of a simplex, by its weights there.
+template <class T>
+struct Nearest {
+    int count = 0;
+    int keep[3] = {};  ///< vertices that span the feature
+    T weight[3] = {};
+    typename Arithmetic<T>::Vec direction;  ///< from the origin to K, perpendicular to the feature
+    T squared = {};                         ///< squared distance
+};
+
+template <class T>
+class Solver {
+    using Number = Arithmetic<T>;
+    using Vec = typename Number::Vec;
+
+public:
+    Solver(const Simplex<T>& simplex, double size) : simplex_(simplex), size_(size) {}
+
+    /// Nearest point of the whole simplex; count 4 and weights of all its vertices where it holds the origin.
+    struct Answer {
+        bool enclosed = false;
+        T inside[4] = {};
+        Nearest<T> nearest;
+    };
+    Answer solve() const {
+        switch (simplex_.count) {
+            case 1:
+                return {false, {}, point(0)};
+            case 2:
+                return {false, {}, edge(0, 1)};
+            case 3:
+                return {false, {}, face(0, 1, 2)};
+            default:
+                return solid();
+        }
+    }
+
+private:
+    Vec w(int i) const { return simplex_.vertex[i].w; }
+
+    Nearest<T> point(int i) const {
+        Nearest<T> out;
+        out.count = 1;
+        out.keep[0] = i;
+        out.weight[0] = T{1.0};
+        out.direction = w(i);
+        out.squared = dot(w(i), w(i));
+        return out;
+    }
+
+    Nearest<T> edge(int i, int j) const {
+        const Vec e = w(j) - w(i);
+        const T squared = dot(e, e);
+        const T along = -dot(w(i), e);
+        if (!(along > T{0.0})) {
+            return point(i);
+        }
+        if (!(along < squared)) {
+            return point(j);
+        }
+        Nearest<T> out;
+        out.count = 2;
+        out.keep[0] = i;
+        out.keep[1] = j;
+        out.weight[1] = along / squared;
+        out.weight[0] = (squared - along) / squared;
+        // From the nearer end; then take out what rounding has left along the edge, or a short vector would
+        // lean.
+        const bool near_i = out.weight[1] < T{0.5};
+        out.direction = near_i ? w(i) + out.weight[1] * e : w(j) - out.weight[0] * e;
+        out.direction = out.direction - (dot(out.direction, e) / squared) * e;
+        out.squared = dot(out.direction, out.direction);
+        return out;
+    }
+
+    Nearest<T> face(int i, int j, int k) const {
+        const Vec e = w(j) - w(i);
+        const Vec f = w(k) - w(i);
+        const Vec n = cross(e, f);
+        const T squared = dot(n, n);
+        // Weights times |n|^2 of the foot of the perpendicular; relative to a vertex, so that a far origin
+        // costs little.
+        const Vec q = -w(i);
+        const T at_j = dot(cross(q, f), n);
+        const T at_k = dot(cross(e, q), n);
+        const T at_i = squared - at_j - at_k;
+        if (squared > T{0.0} && at_i > T{0.0} && at_j > T{0.0} && at_k > T{0.0}) {
+            Nearest<T> out;
+            out.count = 3;
+            out.keep[0] = i;
+            out.keep[1] = j;
+            out.keep[2] = k;
+            out.weight[0] = at_i / squared;
+            out.weight[1] = at_j / squared;
+            out.weight[2] = at_k / squared;
+            const T height = dot(n, w(i));
+            out.direction = height < T{0.0} ? -n : n;
+            out.squared = height * height / squared;
+            return out;
+        }
+        // The nearest point is on an edge that the foot lies beyond; on a face without area, on any of them.
+        Nearest<T> best;
+        const bool any = !(squared > T{0.0});
+        if (any || !(at_i > T{0.0})) {
+            best = nearer(best, edge(j, k));
+        }
+        if (any || !(at_j > T{0.0})) {
+            best = nearer(best, edge(i, k));
+        }
+        if (any || !(at_k > T{0.0})) {
+            best = nearer(best, edge(i, j));
+        }
+        return best;
+    }
+
+    Answer solid() const {
+        constexpr int kFaces[4][4] = {
+            {0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 3, 1}, {1, 2, 3, 0}};  // face, opposite vertex
+        const double doubt = Number::kSideError * size_ * size_ * size_;
+        Answer out;
+        out.enclosed = true;
+        for (const auto& f : kFaces) {
+            const Vec n = cross(w(f[1]) - w(f[0]), w(f[2]) - w(f[0]));
+            const T opposite = dot(n, w(f[3]) - w(f[0]));
+            const T origin = -dot(n, w(f[0]));
+            const bool inside = (origin > T{0.0}) == (opposite > T{0.0}) &&
+                                Number::absolute(origin) > doubt && Number::absolute(opposite) > doubt;
+            if (inside) {
+                out.inside[f[3]] = origin / opposite;
+                continue;
+            }
+            out.enclosed = false;
+            out.nearest = nearer(out.nearest, face(f[0], f[1], f[2]));
+        }
+        return out;
+    }
+
+    static Nearest<T> nearer(const Nearest<T>& best, const Nearest<T>& other) {
+        return best.count == 0 || other.squared < best.squared ? other : best;
+    }
+
+    const Simplex<T>& simplex_;
+    double size_;
+};
+
+/// Keeps the vertices of the feature, in order.
+template <class T>
+Simplex<T> reduced(const Simplex<T>& simplex, const Nearest<T>& nearest) {
+    Simplex<T> out;
+    out.count = nearest.count;
+    for (int i = 0; i < nearest.count; ++i) {
+        out.vertex[i] = simplex.vertex[nearest.keep[i]];
+        out.weight[i] = nearest.weight[i];
+    }
+    return out;
+}
+
+/// Witness points of the weights, normalised in doubles so that they sum to 1.
+template <class T>
+Gjk with_points(Gjk out, const Simplex<T>& simplex) {
+    double sum = 0.0;
+    for (int i = 0; i < simplex.count; ++i) {
+        sum += Arithmetic<T>::to_double(simplex.weight[i]);
+    }
+    out.witness = {};
+    out.witness.count = simplex.count;
+    out.point_a = {};
+    out.point_b = {};
+    for (int i = 0; i < simplex.count; ++i) {
+        const Vertex<T>& v = simplex.vertex[i];
+        const double weight = simplex.count == 1 ? 1.0 : Arithmetic<T>::to_double(simplex.weight[i]) / sum;
+        out.witness.a[i] = v.index_a;
+        out.witness.b[i] = v.index_b;
+        out.witness.weight[i] = weight;
+        out.point_a = out.point_a + weight * v.a;
+        out.point_b = out.point_b + weight * v.b;
+    }
+    out.length = norm(out.point_b - out.point_a);
+    return out;
+}
+
+template <class T>
+Gjk run(const Core& a, const Core& b, Vec3 start) {
+    using Number = Arithmetic<T>;
+    using Vec = typename Number::Vec;
+    const double size = a.reach + b.reach;
+    Gjk out;
+    Simplex<T> simplex;  // candidate
+    Simplex<T> feature;  // the feature of it that holds the nearest point so far
+    T shortest = T{std::numeric_limits<double>::infinity()};
+    Vec n = Number::from(start);
+    T length = T{std::numeric_limits<double>::infinity()};
+    while (true) {
+        // The vertex of K furthest against n, and with it the gap between the supports.
+        const auto top = highest(a, n);
+        const auto bottom = lowest(b, n);
+        const double gap = Number::to_double(bottom.value - top.value);
+        if (gap > out.gap) {
+            out.gap = gap;
+            out.normal = Number::to_vec3(n);
+        }
+        if (feature.count > 0 && Number::to_double(length) - gap <= kMeetingGap * size) {
+            out = with_points(out, feature);
+            // On a sliver the weights can be worse than the length: believe the points.
+            out.state = out.length - gap <= kMeetingGap * size ? GjkState::apart : GjkState::stalled;
+            return out;
+        }
+        if (feature.count > 0 && Number::to_double(length) <= kContact * size) {
+            out = with_points(out, feature);
+            out.state = GjkState::contact;
+            return out;
+        }
+        simplex = feature;
+        for (int i = 0; i < simplex.count; ++i) {
+            if (simplex.vertex[i].index_a == top.vertex && simplex.vertex[i].index_b == bottom.vertex) {
+                return with_points(out,
+                                   feature);  // stalled: nothing lies beyond, yet the bounds have not met
+            }
+        }
+        Vertex<T>& added = simplex.vertex[simplex.count++];
+        added = {top.vertex, bottom.vertex, vertex_of(a, top.vertex), vertex_of(b, bottom.vertex), {}};
+        added.w = Number::difference(added.b, added.a);
+
+        const auto answer = Solver<T>(simplex, size).solve();
+        if (answer.enclosed) {
+            for (int i = 0; i < 4; ++i) {
+                simplex.weight[i] = answer.inside[i];
+            }
+            out = with_points(out, simplex);
+            out.state = GjkState::enclosed;
+            return out;
+        }
+        if (!(answer.nearest.squared < shortest) || ++out.iterations > kMaxSteps) {
+            return with_points(out, feature);  // stalled
+        }
+        shortest = answer.nearest.squared;
+        length = Number::root(shortest);
+        feature = reduced(simplex, answer.nearest);
+        const T size_of_direction = Number::root(dot(answer.nearest.direction, answer.nearest.direction));
+        if (!(size_of_direction > T{0.0})) {
+            out = with_points(out, feature);
+            out.state = GjkState::contact;
+            return out;
+        }
+        n = Number::divided(answer.nearest.direction, size_of_direction);
+    }
+}
+
+}  // namespace
+
+Gjk gjk(const Core& a, const Core& b, Vec3 start) { return run<double>(a, b, start); }
+
+Gjk gjk_wide(const Core& a, const Core& b, Vec3 start) { return run<DoubleDouble>(a, b, start); }
+
+}  // namespace geomsrv

@@ -1,0 +1,38 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Nearest points of two convex polytopes by the algorithm of Gilbert, Johnson and Keerthi (1988); book
+// sections 6.10 and 10.12 sketch it.  It descends on the difference K = {q - p : p in a, q in b}: their
+// distance is that of K from the origin, and they meet where K holds the origin.
+#pragma once
+
+#include "geom/core.hpp"
+#include "geom/separation.hpp"
+
+namespace geomsrv {
+
+enum class GjkState : std::uint8_t {
+    apart,     ///< length - gap <= kMeetingGap * size: nearest points found (touching included)
+    enclosed,  ///< four vertices of K hold the origin strictly inside, by more than rounding: the bodies
+               ///< overlap
+    contact,   ///< the points coincide to rounding, but no direction was found that separates there
+    stalled,   ///< no progress in this arithmetic; the best direction and points still bound the distance
+};
+
+struct Gjk {
+    GjkState state = GjkState::stalled;
+    Vec3 normal;  ///< unit, direction of the largest gap seen, from a to b
+    double gap = -std::numeric_limits<double>::infinity();    ///< along `normal`, see separation.hpp
+    double length = std::numeric_limits<double>::infinity();  ///< |point_b - point_a|
+    Vec3 point_a;  ///< witness points of the two cores; a common point if enclosed
+    Vec3 point_b;
+    Witness witness;
+    int iterations = 0;
+};
+
+/// In double arithmetic, from the direction `start` (unit).
+Gjk gjk(const Core& a, const Core& b, Vec3 start);
+
+/// The same steps in double-double arithmetic, for what doubles cannot finish: needles and slivers.
+Gjk gjk_wide(const Core& a, const Core& b, Vec3 start);
+
+}  // namespace geomsrv

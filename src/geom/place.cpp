@@ -1,0 +1,218 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/place.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace geomsrv {
+
+namespace {
+
+// A length computed from squares is off by less than this; reaches are rounded up by it.
+constexpr double kRoundedUp = 1.0 + 16 * kUnitRoundoff;
+
+// |R| <= 1 + kRotationStretch for a matrix made from a unit quaternion in doubles: the norm of the quaternion
+// is off by 2 u, that of its matrix by twice as much, and each entry takes 5 roundings of numbers up to 2.
+constexpr double kRotationStretch = 64 * kUnitRoundoff;
+
+// R (v - m): 1 u for the difference, and 3 u for each row of the product, whose lengths add up to sqrt(3).
+constexpr double kRotatedPointError = 7 * kUnitRoundoff;
+
+bool is_identity(const Mat3& r) {
+    return r.row[0].x == 1.0 && r.row[1].y == 1.0 && r.row[2].z == 1.0 && r.row[0].y == 0.0 &&
+           r.row[0].z == 0.0 && r.row[1].x == 0.0 && r.row[1].z == 0.0 && r.row[2].x == 0.0 &&
+           r.row[2].y == 0.0;
+}
+
+Vec3 column(const Mat3& r, int i) {
+    const auto at = [i](Vec3 v) { return i == 0 ? v.x : i == 1 ? v.y : v.z; };
+    return {at(r.row[0]), at(r.row[1]), at(r.row[2])};
+}
+
+struct Bounds {
+    Vec3 lower;
+    Vec3 upper;
+};
+
+Bounds bounds_of(const ShapeView& shape) {
+    Bounds out{{shape.vertices[0], shape.vertices[1], shape.vertices[2]}, {}};
+    out.upper = out.lower;
+    for (std::ptrdiff_t i = 1; i < shape.count; ++i) {
+        const double* v = shape.vertices + 3 * i;
+        out.lower = {std::min(out.lower.x, v[0]), std::min(out.lower.y, v[1]), std::min(out.lower.z, v[2])};
+        out.upper = {std::max(out.upper.x, v[0]), std::max(out.upper.y, v[1]), std::max(out.upper.z, v[2])};
+    }
+    return out;
+}
+
+/// Halves first: the sum of two large coordinates must not overflow.
+Vec3 middle_of(const Bounds& bounds) { return 0.5 * bounds.lower + 0.5 * bounds.upper; }
+
+/// A vector with a bound of its rounding.
+struct Rounded {
+    Vec3 value;
+    double error = 0.0;
+};
+
+Rounded rounded(WideVec3 v, double size) {
+    return {narrow(v), safe_norm({v.x.lo, v.y.lo, v.z.lo}) + 8 * kWideRoundoff * size};
+}
+
+/// scale * (R m + t - origin): far apart these cancel, so the sum is formed in double-double.
+Rounded relative(Vec3 m, const Transform& X, const LocalFrame& frame) {
+    const Vec3 t = frame.scale * X.translation;
+    const Vec3 o = frame.scale * frame.origin;
+    const bool centered = m.x == 0.0 && m.y == 0.0 && m.z == 0.0;
+    const bool local = o.x == 0.0 && o.y == 0.0 && o.z == 0.0;
+    if (centered && local) {
+        return {t, 0.0};
+    }
+    const WideVec3 p = widen(frame.scale * m);
+    const auto row = [&](int i) { return dot(p, X.rotation.row[i]); };
+    const WideVec3 turned = {row(0), row(1), row(2)};
+    const double size = safe_norm(frame.scale * m) + safe_norm(t) + safe_norm(o);
+    return rounded(turned + exact_difference(t, o), size);
+}
+
+PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, const LocalFrame& frame) {
+    const WideVec3 own = widen({shape.params[0], shape.params[1], shape.params[2]});
+    const auto row = [&](int i) { return dot(own, X.rotation.row[i]); };
+    const WideVec3 turned = {row(0), row(1), row(2)};
+    const Rounded normal = rounded(turned, 0.0);
+    // normal . (x - t) <= offset becomes normal . local <= offset + normal . (t - origin).
+    const WideVec3 shift = exact_difference(frame.scale * X.translation, frame.scale * frame.origin);
+    const double own_offset = frame.scale * shape.params[3];
+    const DoubleDouble offset = DoubleDouble{own_offset, 0.0} + dot(turned, shift);
+    const double size = std::abs(own_offset) + safe_norm(narrow(shift));
+    // Numbers whose sum fits in two doubles have been added exactly: a low part of 0 says that nothing was
+    // rounded.
+    const double lost = offset.lo == 0.0 ? 0.0 : 8 * kWideRoundoff * size;
+    const double normal_lost = normal.error == 0.0 ? 0.0 : 8 * kWideRoundoff;
+    return {normal.value, offset.hi, normal.error + normal_lost, std::abs(offset.lo) + lost};
+}
+
+void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch,
+                Core& core) {
+    const Bounds bounds = bounds_of(shape);
+    const Vec3 middle = middle_of(bounds);
+    const double scale = frame.scale;
+    const Vec3 m = scale * middle;
+    const double spread = safe_norm(scale * (bounds.upper - middle)) * kRoundedUp;
+    const auto n = static_cast<std::size_t>(shape.count);
+    double* x = scratch;
+    double* y = x + n;
+    double* z = y + n;
+    const bool turned = !is_identity(X.rotation);
+    const Mat3& r = X.rotation;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* v = shape.vertices + 3 * i;
+        const Vec3 local = {scale * v[0] - m.x, scale * v[1] - m.y, scale * v[2] - m.z};
+        const Vec3 p = turned ? r * local : local;
+        x[i] = p.x;
+        y[i] = p.y;
+        z[i] = p.z;
+    }
+    const Rounded center = relative(middle, X, frame);
+    core.center = center.value;
+    core.points = scratch;
+    core.count = static_cast<int>(shape.count);
+    core.error =
+        center.error + (turned ? kRotatedPointError : kUnitRoundoff) * spread + scale * shape.params[0];
+    core.reach = (safe_norm(core.center) + spread * (1.0 + kRotationStretch)) * kRoundedUp;
+}
+
+}  // namespace
+
+double largest_of(Vec3 v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+double safe_norm(Vec3 v) {
+    const double largest = largest_of(v);
+    if (largest == 0.0 || (largest > 0x1p-400 && largest < 0x1p400)) {
+        return norm(v);
+    }
+    if (!(largest <= std::numeric_limits<double>::max())) {
+        return std::numeric_limits<double>::infinity();
+    }
+    const double unit = scale_for(largest);
+    return norm(unit * v) / unit;
+}
+
+double scale_for(double size) {
+    // 2^1000 at most: the scale itself must be finite, and the smallest subnormal is then 2^-74.
+    return std::ldexp(1.0, std::clamp(-std::ilogb(size), -1000, 1000));
+}
+
+Vec3 middle_of(const ShapeView& shape) {
+    return shape.kind == ShapeKind::convex ? middle_of(bounds_of(shape)) : Vec3{};
+}
+
+double magnitude_of(const ShapeView& shape, const Transform& X) {
+    double largest = largest_of(X.translation);
+    const int first = shape.kind == ShapeKind::half_space ? 3 : shape.kind == ShapeKind::capsule ? 1 : 0;
+    const int last = shape.kind == ShapeKind::box ? 3 : first + 1;
+    for (int i = first; i < last && shape.kind != ShapeKind::sphere; ++i) {
+        largest = std::max(largest, std::abs(shape.params[i]));
+    }
+    for (std::ptrdiff_t i = 0; i < 3 * shape.count; ++i) {
+        largest = std::max(largest, std::abs(shape.vertices[i]));
+    }
+    return largest;
+}
+
+Placed place(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch) {
+    Placed out;
+    if (shape.kind == ShapeKind::half_space) {
+        out.half_space = place_half_space(shape, X, frame);
+        return out;
+    }
+    Core& core = out.core;
+    if (shape.kind == ShapeKind::convex) {
+        place_hull(shape, X, frame, scratch, core);
+        return out;
+    }
+    const Rounded center = relative({}, X, frame);
+    core.center = center.value;
+    double spread = 0.0;
+    if (shape.kind == ShapeKind::box) {
+        core.generators = 3;
+        for (int i = 0; i < 3; ++i) {
+            const double half = frame.scale * shape.params[i];
+            core.generator[i] = half * column(X.rotation, i);
+            spread += half;
+        }
+    } else {
+        out.radius = shape.params[0];
+        if (shape.kind == ShapeKind::capsule) {
+            core.generators = 1;
+            const double half = frame.scale * shape.params[1];
+            core.generator[0] = half * column(X.rotation, 2);
+            spread = half;
+        }
+    }
+    spread *= 1.0 + kRotationStretch;
+    core.reach = (safe_norm(core.center) + spread) * kRoundedUp;
+    core.error = center.error + (is_identity(X.rotation) ? 0.0 : kUnitRoundoff * spread);
+    return out;
+}
+
+Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFrame& frame) {
+    Core core;
+    const WideVec3 shift = exact_difference(frame.scale * center, frame.scale * frame.origin);
+    const Rounded middle = rounded(shift, 0.0);
+    core.center = middle.value;
+    core.generators = 3;
+    const double half[3] = {half_extents.x, half_extents.y, half_extents.z};
+    double spread = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        core.generator[i] = (frame.scale * half[i]) * axes.row[i];
+        spread += safe_norm(core.generator[i]);
+    }
+    spread *= kRoundedUp;
+    core.reach = (safe_norm(core.center) + spread) * kRoundedUp;
+    core.error = middle.error + kUnitRoundoff * spread;
+    return core;
+}
+
+}  // namespace geomsrv

@@ -1,0 +1,12 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Signed distance of two points: the cores of two spheres.
+#pragma once
+
+#include "geom/separation.hpp"
+
+namespace geomsrv {
+
+CoreSeparation point_point(const Core& a, const Core& b);
+
+}  // namespace geomsrv

@@ -1,0 +1,27 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/point_segment.hpp"
+
+#include <algorithm>
+
+namespace geomsrv {
+
+// Book section 10.2.1, from the middle of the segment: the nearest point is center + x g, -1 <= x <= 1.
+CoreSeparation point_segment(const Core& a, const Core& b) {
+    const Vec3 g = b.generator[0];
+    const Vec3 to_center = b.center - a.center;
+    const double squared = dot(g, g);
+    const double x = squared > 0.0 ? std::clamp(-dot(to_center, g) / squared, -1.0, 1.0) : 0.0;
+    Vec3 gap = to_center + x * g;
+    if (squared > 0.0 && std::abs(x) < 1.0) {
+        // Rounding leaves a part along g, which matters where the gap is short.
+        gap = gap - (dot(gap, g) / squared) * g;
+    }
+    const bool on = gap.x == 0.0 && gap.y == 0.0 && gap.z == 0.0;
+    const Vec3 normal = on ? perpendicular(g) : normalized(gap);
+    CoreSeparation out = certify_apart(a, b, normal, a.center, b.center + x * g);
+    out.stage = Stage::closed_form;
+    return out;
+}
+
+}  // namespace geomsrv

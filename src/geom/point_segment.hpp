@@ -1,0 +1,12 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Signed distance of a point and a segment: the cores of a sphere and a capsule.
+#pragma once
+
+#include "geom/separation.hpp"
+
+namespace geomsrv {
+
+CoreSeparation point_segment(const Core& a, const Core& b);
+
+}  // namespace geomsrv

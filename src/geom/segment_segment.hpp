@@ -1,0 +1,12 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Signed distance of two segments: the cores of two capsules.
+#pragma once
+
+#include "geom/separation.hpp"
+
+namespace geomsrv {
+
+CoreSeparation segment_segment(const Core& a, const Core& b);
+
+}  // namespace geomsrv
