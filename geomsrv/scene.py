@@ -2,27 +2,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """A world of named shapes: poses, twists, allowed pairs; atomic updates, and queries over all pairs that matter.
 
-Numpy only.  Solids are compared with solids.  Planar shapes (`Polygon`) live in the plane z = 0 of the fixed frame and
-are compared with each other only.
+Numpy only.  Solids are compared with solids.  Planar shapes (`Polygon`) live in the plane z = 0 of the fixed
+frame and are compared with each other only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from enum import IntEnum
+import operator
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from geomsrv.answers import BoolArray, ByteArray, Cost, FloatArray, IntArray
-from geomsrv.shapes import Frustum, Shape
+from geomsrv import _validate
+from geomsrv.answers import BoolArray, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
+from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
+from geomsrv.errors import GeometryError, SceneError
+from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, first_contact_rows
+from geomsrv.nearest import nearest_rows
+from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
+from geomsrv.scene_plan import describe
+from geomsrv.shapes import Frustum, Polygon, Shape
+from geomsrv.visibility import Visibility, sight
+from geomsrv.world import ShapeTable, World
 
 __all__ = ["PairContacts", "PairDistances", "Scene", "SceneCull", "SceneObject", "SceneUpdate", "Visibility"]
 
 Pair = tuple[str, str]
+Faults = dict[str, str]
+
+EFFECTS = ("distance", "witness", "penetration")  #: what a distance query can be asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +50,17 @@ class SceneObject:
         Not empty.
     shape : Shape
     pose : (7,) float
-        x y z [m], qx qy qz qw: pose of the shape in `frame`.  A `Polygon` must stay in the plane: z = 0, no tilt.
+        x y z [m], qx qy qz qw: pose of the shape in `frame`.  A `Polygon` must stay in the plane: z = 0, no
+        tilt.
     twist : (6,) float
         vx vy vz [m/s], wx wy wz [rad/s] along the axes of `frame`, of the shape's origin and about it.
         `frame` itself counts as being at rest.
     frame : str
-        Frame `pose` and `twist` are given in; empty is the scene's fixed frame.  Converted once, by `Scene.apply`:
-        what the scene gives back is in the fixed frame.
+        Frame `pose` and `twist` are given in; empty is the scene's fixed frame.  Converted once, by
+        `Scene.apply`: what the scene gives back is in the fixed frame.
     uncertainty : float
-        Radius [m] >= 0 by which each vertex may be off, e.g. because it came as float32.  Widens the interval of every
-        answer the object has part in.
+        Radius [m] >= 0 by which each vertex may be off, e.g. because it came as float32.  Widens the interval
+        of every answer the object has part in.
     """
 
     id: str
@@ -68,10 +84,11 @@ class SceneUpdate:
     add : sequence of SceneObject
         An existing id is replaced; the same id twice is a fault.
     allow : sequence of (str, str)
-        Pairs whose contact is allowed, that is, pairs to ignore.  The ids need not be present (yet): an SRDF lists
-        links without geometry.  An id with itself is a fault.
+        Pairs whose contact is allowed, that is, pairs to ignore.  The ids need not be present (yet): an SRDF
+        lists links without geometry.  An id with itself is a fault.
     disallow : sequence of (str, str)
-        Allowed pairs to check again.  A pair that is not allowed is a fault: a misspelt one would stay ignored.
+        Allowed pairs to check again.  A pair that is not allowed is a fault: a misspelt one would stay
+        ignored.
     """
 
     add: Sequence[SceneObject] = ()
@@ -79,15 +96,6 @@ class SceneUpdate:
     clear: bool = False
     allow: Sequence[Pair] = ()
     disallow: Sequence[Pair] = ()
-
-
-class Visibility(IntEnum):
-    """What a frustum sees of an object; the first three are those of `CullState`."""
-
-    OUTSIDE = 0  #: no common point
-    INTERSECTS = 1  #: a common point, and a point of the object outside the frustum
-    INSIDE = 2  #: every point of the object is in the frustum
-    MAY_INTERSECT = 3  #: not inside; its bounding box meets the frustum, and there is no kernel to tell more
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +138,8 @@ class PairDistances(_PairRows):
     ----------
     ids_a, ids_b : list of str
     distance, lower, upper : (n,) float64
-        Distance [m] and a proven interval around the exact value, widened by the objects' uncertainty.  0 for touching
-        and overlapping bodies, or minus the penetration depth if ``want`` named "penetration".
+        Distance [m] and a proven interval around the exact value, widened by the objects' uncertainty.  0 for
+        touching and overlapping bodies, or minus the penetration depth if ``want`` named "penetration".
     point_a, point_b : (n, 3) float64
         Nearest points, or the deepest ones, fixed frame.
     normal : (n, 3) float64
@@ -166,11 +174,12 @@ class PairContacts(_PairRows):
     ----------
     ids_a, ids_b : list of str
     status : (n,) uint8
-        `ContactStatus`.  UNSUPPORTED: apart now, and no kernel for how the two move; also listed in `unsupported`.
-        NEVER: apart throughout as given, but within their uncertainty they may touch from ``time_lower`` on.
+        `ContactStatus`.  UNSUPPORTED: apart now, and no kernel for how the two move; also listed in
+        `unsupported`. NEVER: apart throughout as given, but within their uncertainty they may touch from
+        ``time_lower`` on.
     time, time_lower, time_upper : (n,) float64
-        First contact [s] and a proven interval, widened by the objects' uncertainty; an upper end of inf: within the
-        uncertainty they may pass each other.
+        First contact [s] and a proven interval, widened by the objects' uncertainty; an upper end of inf:
+        within the uncertainty they may pass each other.
     last_time : (n,) float64
         Last contact [s], at most the horizon; NaN where no kernel follows the motion.
     normal : (n, 3) float64
@@ -239,8 +248,8 @@ class Scene:
     allowed_pairs : iterable of (str, str)
         Pairs to ignore from the start; `SceneUpdate.clear` keeps them.
     transforms : callable, optional
-        ``transforms(frame)`` gives the pose (7,) of `frame` in the fixed frame, or raises an exception whose text says
-        why not.  Without it an object given in another frame is refused by name.
+        ``transforms(frame)`` gives the pose (7,) of `frame` in the fixed frame, or raises an exception whose
+        text says why not.  Without it an object given in another frame is refused by name.
 
     Examples
     --------
@@ -261,40 +270,70 @@ class Scene:
         allowed_pairs: Iterable[Pair] = (),
         transforms: Callable[[str], ArrayLike] | None = None,
     ) -> None:
-        raise NotImplementedError
+        faults: Faults = {}
+        self._first_allowed = frozenset(_pairs(allowed_pairs, "allowed_pairs", faults))
+        if faults:
+            raise SceneError(faults)
+        self.fixed_frame = fixed_frame
+        self._transforms = transforms
+        self._lock = threading.RLock()
+        self._objects: dict[str, SceneObject] = {}
+        self._allowed = self._first_allowed
+        # What queries see.  Made from the above when asked for: a scene that is built object by object costs
+        # n, not n^2.
+        self._world = World.empty()
+        self._outdated = False
+        self._replaced: set[str] = set()  # objects whose state in `_world`, if any, is no longer theirs
+        self._resolved: tuple[Sequence[str], Mapping[str, int], IntArray] = (
+            (),
+            self._world.index,
+            np.zeros(0, np.int64),
+        )
+        self._version = 0
+        self._stamp: Any = None
 
     @property
     def version(self) -> int:
         """Grows by one with every change that took effect; 0 at first."""
-        raise NotImplementedError
+        return self._version
 
     @property
     def stamp(self) -> Any:
         """The newest stamp given to `set_states`; None before."""
-        raise NotImplementedError
+        return self._stamp
 
     @property
     def ids(self) -> tuple[str, ...]:
         """Every object's id, sorted."""
-        raise NotImplementedError
+        return self._snapshot().ids
 
     @property
     def allowed_pairs(self) -> frozenset[Pair]:
         """Pairs that are ignored, smaller id first."""
-        raise NotImplementedError
+        return self._allowed
 
     def __len__(self) -> int:
-        raise NotImplementedError
+        return len(self._objects)
 
     def __contains__(self, name: object) -> bool:
-        raise NotImplementedError
+        return name in self._objects
 
     def __iter__(self) -> Iterator[str]:
-        raise NotImplementedError
+        return iter(self.ids)
 
     def __getitem__(self, name: str) -> SceneObject:
         """The object as it is now, in the fixed frame; KeyError for an unknown id."""
-        raise NotImplementedError
+        world = self._snapshot()
+        row = world.index[name]
+        return SceneObject(
+            id=name,
+            shape=world.table.shapes[world.shape[row]],
+            pose=world.poses[row].copy(),
+            twist=world.twists[row].copy(),
+            uncertainty=float(world.uncertainty[row]),
+        )
+
+    # ------------------------------------------------------------------------------------------------ changes
 
     def apply(self, update: SceneUpdate) -> int:
         """Change the scene as a whole or not at all.
@@ -313,7 +352,29 @@ class Scene:
         SceneError
             ``errors`` names every bad object; the scene is as it was.
         """
-        raise NotImplementedError
+        faults: Faults = {}
+        with self._lock:
+            left = {} if update.clear else dict(self._objects)
+            for name in update.remove:
+                if left.pop(name, None) is None:
+                    _blame(faults, name, "cannot be removed: no such object")
+            added = self._checked(update.add, faults)
+            allowed = set(self._first_allowed if update.clear else self._allowed)
+            allowed.update(_pairs(update.allow, "allow", faults))
+            for pair in _pairs(update.disallow, "disallow", faults):
+                if pair not in allowed:
+                    _blame(faults, pair[0], f"disallow: the pair with {pair[1]!r} is not allowed")
+                allowed.discard(pair)
+            if faults:
+                raise SceneError(faults)
+            changed = bool(added) or left.keys() != self._objects.keys() or allowed != self._allowed
+            if changed:
+                self._objects, self._allowed = left | added, frozenset(allowed)
+                # An object that was removed and comes back later must not find its old state.
+                self._replaced |= added.keys() | (self._world.index.keys() - self._objects.keys())
+                self._outdated = True
+                self._version += 1
+            return self._version
 
     def set_states(
         self, ids: Sequence[str], poses: ArrayLike, twists: ArrayLike | None = None, stamp: Any = None
@@ -343,7 +404,27 @@ class Scene:
         GeometryError
             An array has the wrong shape or dtype.
         """
-        raise NotImplementedError
+        with self._lock:
+            world = self._snapshot()
+            rows = self._resolve(ids, world)
+            poses = _array(poses, "poses", (len(rows), 7))
+            twists = None if twists is None else _array(twists, "twists", (len(rows), 6))
+            poses, unlike_pose = settled(poses, twists)
+            poses, unlike_plane = laid_flat(poses, twists, world.planar[rows])
+            if faults := unlike_plane | unlike_pose:
+                raise SceneError({world.ids[rows[k]]: text for k, text in sorted(faults.items())})
+            if len(rows) == 0:
+                return self._version
+            # New arrays: queries under way keep the old ones.
+            moved, turning = world.poses.copy(), world.twists
+            moved[rows] = poses
+            if twists is not None:
+                turning = world.twists.copy()
+                turning[rows] = twists
+            self._version += 1
+            self._stamp = stamp if stamp is not None else self._stamp
+            self._world = replace(world, poses=moved, twists=turning, version=self._version, stamp=self._stamp)
+            return self._version
 
     def distances(
         self,
@@ -356,8 +437,8 @@ class Scene:
     ) -> PairDistances:
         """All pairs, allowed ones aside, that are at most `max_distance` apart.
 
-        A pair whose interval is wide (uncertain vertices, or iterations that ran out) is listed as soon as its lower
-        end is that small.
+        A pair whose interval is wide (uncertain vertices, or iterations that ran out) is listed as soon as
+        its lower end is that small.
 
         Parameters
         ----------
@@ -381,13 +462,16 @@ class Scene:
         GeometryError
             Names the argument and the fault; a `SceneError` for unknown ids.
         """
-        raise NotImplementedError
+        start = time.perf_counter_ns()
+        limit = _limit(max_distance, "max_distance")
+        return self._distances(start, limit, ids, others, want, accuracy)
 
     def contacts(
         self, *, ids: Iterable[str] | None = None, others: Iterable[str] | None = None, accuracy: str = "float64"
     ) -> PairDistances:
         """All pairs that touch or overlap now, with penetration depth; arguments as for `distances`."""
-        raise NotImplementedError
+        start = time.perf_counter_ns()
+        return self._distances(start, 0.0, ids, others, ("penetration",), accuracy)
 
     def nearest_pair(
         self,
@@ -399,10 +483,17 @@ class Scene:
     ) -> PairDistances:
         """The pair with the smallest distance, one row; no row if no pair is supported.
 
-        Of equally near pairs the first by (id_a, id_b); with "penetration" in `want` the deepest.  `unsupported` lists
-        those that may be nearer.  Arguments as for `distances`.
+        Of equally near pairs the first by (id_a, id_b); with "penetration" in `want` the deepest.
+        `unsupported` lists those that may be nearer.  Arguments as for `distances`.
         """
-        raise NotImplementedError
+        start = time.perf_counter_ns()
+        tier = _validate.accuracy(accuracy)
+        penetration = "penetration" in _validate.want(want, EFFECTS)
+        world = self._snapshot()
+        selection = _selection(world, ids, others)
+        counts = _considered(world, selection)
+        rows, unsupported = nearest_rows(world, penetration, selection, counts)
+        return _pair_distances(world, rows, unsupported, start, tier, counts)
 
     def first_contacts(
         self,
@@ -414,8 +505,8 @@ class Scene:
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
-        Polygons in pure translation are followed; pairs at rest relative to each other touch now or never; any pair
-        that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.
+        Polygons in pure translation are followed; pairs at rest relative to each other touch now or never;
+        any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.
 
         Parameters
         ----------
@@ -433,13 +524,40 @@ class Scene:
         GeometryError
             Names the argument and the fault; a `SceneError` for unknown ids.
         """
-        raise NotImplementedError
+        start = time.perf_counter_ns()
+        limit = _limit(horizon, "horizon")
+        tier = _validate.accuracy(accuracy)
+        world = self._snapshot()
+        selection = _selection(world, ids, others)
+        counts = _considered(world, selection)
+        pairs = _near(world, boxes_swept(world, limit), 0.0, selection, counts)
+        rows, unsupported = first_contact_rows(world, pairs, limit, counts)
+        counts["unsupported"] += len(unsupported.pairs)
+        sets = [points for points in rows.points if points is not None]
+        sizes = [0 if points is None else len(points) for points in rows.points]
+        return PairContacts(
+            Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+            world.version,
+            world.stamp,
+            _message(world, unsupported),
+            world.ids,
+            rows.pairs,
+            (unsupported.pairs, unsupported.reason.tolist()),
+            rows.status,
+            rows.time,
+            rows.lower,
+            rows.upper,
+            rows.last_time,
+            rows.normal,
+            np.concatenate([np.zeros((0, 3)), *sets]),
+            np.cumsum([0, *sizes], dtype=np.int64),
+        )
 
     def cull(self, frustum: Frustum, *, ids: Iterable[str] | None = None, accuracy: str = "float64") -> SceneCull:
         """What a camera frustum sees of every object.
 
-        Boxes, spheres, capsules, hulls, half spaces and polygons are judged themselves, other kinds by their bounding
-        box: MAY_INTERSECT where that is not enough.
+        Boxes, spheres, capsules, hulls, half spaces and polygons are judged themselves, other kinds by their
+        bounding box: MAY_INTERSECT where that is not enough.
 
         Parameters
         ----------
@@ -454,8 +572,253 @@ class Scene:
         -------
         SceneCull
         """
-        raise NotImplementedError
+        start = time.perf_counter_ns()
+        tier = _validate.accuracy(accuracy)
+        if not isinstance(frustum, Frustum):
+            raise GeometryError(f"frustum must be Frustum, got {type(frustum).__name__}")
+        world = self._snapshot()
+        rows = np.arange(len(world)) if ids is None else np.flatnonzero(_members(world, ids, "ids"))
+        counts: Counter[str] = Counter(objects=len(rows))
+        state, certain, boxed = sight(world, rows, frustum, counts)
+        message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
+        return SceneCull(
+            [world.ids[k] for k in rows.tolist()],
+            state,
+            certain,
+            message,
+            Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+            world.version,
+            world.stamp,
+        )
 
     def plan(self) -> str:
         """In words, line by line: what each query computes for what is in the scene, and what is skipped and why."""
-        raise NotImplementedError
+        world = self._snapshot()
+        return describe(world, self.fixed_frame, len(self._allowed))
+
+    # ----------------------------------------------------------------------------------------------- internals
+
+    def _snapshot(self) -> World:
+        """The scene as queries see it."""
+        with self._lock:
+            if self._outdated:
+                self._world = self._rebuilt()
+                self._outdated = False
+                self._replaced = set()
+            return self._world
+
+    def _rebuilt(self) -> World:
+        old, ids = self._world, tuple(sorted(self._objects))
+        objects = [self._objects[name] for name in ids]
+        distinct: dict[int, int] = {}
+        shape = np.array([distinct.setdefault(id(o.shape), len(distinct)) for o in objects], dtype=np.int64)
+        by_identity = {id(o.shape): o.shape for o in objects}
+        shapes = [by_identity[key] for key in distinct]
+        same = len(shapes) == len(old.table.shapes) and all(map(operator.is_, shapes, old.table.shapes))
+        poses = np.array([o.pose for o in objects], dtype=np.float64).reshape(len(ids), 7)
+        twists = np.array([o.twist for o in objects], dtype=np.float64).reshape(len(ids), 6)
+        # States that came by `set_states` are newer than what the objects were added with.
+        kept = [k for k, name in enumerate(ids) if name in old.index and name not in self._replaced]
+        source = [old.index[ids[k]] for k in kept]
+        poses[kept], twists[kept] = old.poses[source], old.twists[source]
+        index = {name: k for k, name in enumerate(ids)}
+        keys = [index[a] * len(ids) + index[b] for a, b in self._allowed if a in index and b in index]
+        return World(
+            ids=ids,
+            index=index,
+            table=old.table if same else ShapeTable.of(shapes),
+            shape=shape,
+            uncertainty=np.array([o.uncertainty for o in objects], dtype=np.float64),
+            poses=poses,
+            twists=twists,
+            allowed=np.array(sorted(keys), dtype=np.int64),
+            version=self._version,
+            stamp=self._stamp,
+        )
+
+    def _checked(self, objects: Sequence[Any], faults: Faults) -> dict[str, SceneObject]:
+        """Objects in the fixed frame, with checked numbers; what is wrong goes to `faults`."""
+        good: dict[str, Any] = {}
+        for k, item in enumerate(objects):
+            if not isinstance(item, SceneObject):
+                _blame(faults, f"add[{k}]", f"must be SceneObject, got {type(item).__name__}")
+            elif not isinstance(item.id, str) or not item.id:
+                _blame(faults, f"add[{k}]", f"id must be a name, got {item.id!r}")
+            elif item.id in good:
+                _blame(faults, item.id, "added twice")
+            else:
+                good[item.id] = item
+        for name, item in good.items():
+            if not isinstance(item.shape, Shape | Frustum):
+                _blame(faults, name, f"shape must be Shape, got {type(item.shape).__name__}")
+            if not isinstance(item.frame, str):
+                _blame(faults, name, f"frame must be a name, got {item.frame!r}")
+        items = list(good.values())
+        poses, wrong_pose = numbers([item.pose for item in items], "pose", IDENTITY)
+        twists, wrong_twist = numbers([item.twist for item in items], "twist", np.zeros(6))
+        radii, wrong_radius = numbers([[item.uncertainty] for item in items], "uncertainty", np.zeros(1))
+        poses, unlike_pose = settled(poses, twists)
+        frames = [item.frame if isinstance(item.frame, str) else "" for item in items]
+        poses, twists, unknown_frame = in_fixed_frame(poses, twists, frames, self.fixed_frame, self._transforms)
+        planar = np.array([isinstance(item.shape, Polygon) for item in items], dtype=bool)
+        poses, unlike_plane = laid_flat(poses, twists, planar)
+        bad_radii = np.flatnonzero(~((radii[:, 0] >= 0.0) & (radii[:, 0] < np.inf))).tolist()
+        negative = {k: f"uncertainty must be finite and >= 0, got {radii[k, 0]}" for k in bad_radii}
+        # The first fault of an object in this order: later ones may only follow from it.
+        found = unlike_plane | unknown_frame | unlike_pose | negative | wrong_radius | wrong_twist | wrong_pose
+        for k, text in sorted(found.items()):
+            _blame(faults, items[k].id, text)
+        return {
+            item.id: replace(item, pose=poses[k], twist=twists[k], frame="", uncertainty=float(radii[k, 0]))
+            for k, item in enumerate(items)
+        }
+
+    def _resolve(self, ids: Sequence[str], world: World) -> IntArray:
+        """Rows of the ids, looked up once: a stream of states names the same ids again and again."""
+        known, index, rows = self._resolved
+        if index is world.index and (ids is known or list(ids) == known):
+            return rows
+        names = list(ids)
+        faults: Faults = {}
+        for name, times in Counter(names).items():
+            if name not in world.index:
+                _blame(faults, name, "no such object")
+            elif times > 1:
+                _blame(faults, name, "listed twice")
+        if faults:
+            raise SceneError(faults)
+        rows = np.array([world.index[name] for name in names], dtype=np.int64)
+        # A list may change under us, so it is kept as a copy; comparing it costs no look-up.
+        self._resolved = (ids if isinstance(ids, tuple) else names, world.index, rows)
+        return rows
+
+    def _distances(
+        self,
+        start: int,
+        limit: float,
+        ids: Iterable[str] | None,
+        others: Iterable[str] | None,
+        want: Sequence[str],
+        accuracy: str,
+    ) -> PairDistances:
+        tier = _validate.accuracy(accuracy)
+        penetration = "penetration" in _validate.want(want, EFFECTS)
+        world = self._snapshot()
+        selection = _selection(world, ids, others)
+        counts = _considered(world, selection)
+        pairs = _near(world, boxes_now(world), limit, selection, counts)
+        rows, unsupported = distance_rows(world, pairs, penetration, counts)
+        open_ended = (rows.uncertainty > 0.0) | (rows.status == DistanceStatus.NOT_CONVERGED)
+        rows = rows.take((rows.distance <= limit) | (open_ended & (rows.lower <= limit)))
+        return _pair_distances(world, rows, unsupported, start, tier, counts)
+
+
+# ---------------------------------------------------------------------------------------------------- the edge
+
+
+def _blame(faults: Faults, name: object, text: str) -> None:
+    """Add a fault of one object to those it has."""
+    key = name if isinstance(name, str) else repr(name)
+    faults[key] = f"{faults[key]}; {text}" if key in faults else text
+
+
+def _pairs(pairs: Iterable[Pair], argument: str, faults: Faults) -> list[Pair]:
+    """Pairs of ids, smaller id first."""
+    out = []
+    for k, pair in enumerate(pairs):
+        names = tuple(pair) if isinstance(pair, tuple | list) else ()
+        if len(names) != 2 or not all(isinstance(name, str) and name for name in names):
+            _blame(faults, f"{argument}[{k}]", f"must be a pair of ids, got {pair!r}")
+        elif names[0] == names[1]:
+            _blame(faults, names[0], f"{argument}: an object makes no pair with itself")
+        else:
+            out.append((min(names), max(names)))
+    return out
+
+
+def _array(value: ArrayLike, name: str, shape: tuple[int, int]) -> FloatArray:
+    """Numbers of the given shape; whether they are finite is judged later, by object."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu" or array.shape != shape:
+        return _validate.floats(array, name, shape)
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _limit(value: float, name: str) -> float:
+    number = float(_validate.floats(value, name, (), allow_infinite=True))
+    if not number >= 0.0:
+        raise GeometryError(f"{name} must be >= 0, got {number}")
+    return number
+
+
+def _members(world: World, ids: Iterable[str], name: str) -> BoolArray:
+    """(n,) bool: the objects listed."""
+    if isinstance(ids, str):
+        raise GeometryError(f"{name} must list ids, got the string {ids!r}")
+    listed = list(ids)
+    unknown = [name for name in listed if name not in world.index]
+    if unknown:
+        raise SceneError({str(name): "no such object" for name in unknown})
+    mask = np.zeros(len(world), dtype=bool)
+    mask[[world.index[name] for name in listed]] = True
+    return mask
+
+
+def _selection(world: World, ids: Iterable[str] | None, others: Iterable[str] | None) -> Selection | None:
+    if ids is None:
+        if others is not None:
+            raise GeometryError("others narrows down ids: give ids too")
+        return None
+    first = _members(world, ids, "ids")
+    return Selection(first, np.ones_like(first) if others is None else _members(world, others, "others"))
+
+
+# ---------------------------------------------------------------------------------------------------- answers
+
+
+def _considered(world: World, selection: Selection | None) -> Counter[str]:
+    """Fresh counters: objects, and the pairs the broad phase has to choose from."""
+    everything = Selection(np.ones(len(world), dtype=bool), np.ones(len(world), dtype=bool))
+    asked = selection or everything
+    pairs = sum(asked.pair_count(family) for family in world.families)
+    return Counter({"objects": len(world), "pairs": pairs, "candidates": 0, "allowed": 0})
+
+
+def _near(world: World, boxes: Aabbs, margin: float, selection: Selection | None, counts: Counter[str]) -> IntArray:
+    """Pairs of either family whose boxes are near enough."""
+    found = [candidates(world, family, boxes, margin, selection) for family in world.families]
+    counts["candidates"] += sum(part.found for part in found)
+    counts["allowed"] += sum(part.allowed for part in found)
+    return np.concatenate([part.pairs for part in found])
+
+
+def _pair_distances(
+    world: World, rows: DistanceRows, unsupported: Unsupported, start: int, tier: str, counts: Counter[str]
+) -> PairDistances:
+    counts["unsupported"] += len(unsupported.pairs)
+    return PairDistances(
+        Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+        world.version,
+        world.stamp,
+        _message(world, unsupported),
+        world.ids,
+        rows.pairs,
+        (unsupported.pairs, unsupported.reason.tolist()),
+        rows.distance,
+        rows.lower,
+        rows.upper,
+        rows.point_a,
+        rows.point_b,
+        rows.normal,
+        rows.status,
+    )
+
+
+def _message(world: World, unsupported: Unsupported) -> str:
+    """What is left out, once for each reason."""
+    reasons = Counter(unsupported.reason.tolist())
+    parts = [f"{count} x {reason}" for reason, count in sorted(reasons.items())]
+    solids, polygons = world.families
+    if len(solids) and len(polygons):
+        parts.append(f"{len(polygons)} polygons are compared with each other only, never with {len(solids)} solids")
+    return "; ".join(parts)

@@ -1,0 +1,440 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Answers for listed pairs of objects, in the fixed frame, with intervals that cover every rounding on the way.
+
+The engine sees a pair through the pose of b in a; here that pose is computed, and what its rounding may have
+changed is added to the interval, together with the objects' own uncertainty.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geomsrv import _core
+from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
+from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
+
+__all__ = ["ContactRows", "DistanceRows", "distance_rows", "first_contact_rows"]
+
+# How much the rounded relative pose may move one body against the other, in terms of r_a + r_b + |p_ab|, r
+# the reach of a body from its origin.  With u = 2^-53 and Q the exact rotation of a unit quaternion that is
+# off by s = |q| - 1, |s| <= 3 u: a rotation matrix computed from it is off by sqrt(99) u (9 entries, up to 5
+# u on the diagonal and 2 u beside it) + 4 s = 22 u.  That holds for R_a, which moves points of a, for R_b,
+# and, with the doubled s of a product, once more (50 u) for the matrix the engine computes from the relative
+# quaternion.  That product of quaternions errs by 4 u in each of four parts, which turns by 16 u.  So r_a
+# counts 22 u, r_b 22 + 50 + 16 = 88 u, |p_ab| 22 u + 6 u for its own arithmetic.
+RELATIVE_POSE_ROUNDING = 96.0 * ROUNDOFF
+
+# Bodies that pass within their uncertainty are followed feature by feature; a polygon has few.  A pair still
+# open after so many steps is reported as one that may touch.
+MAX_APPROACH_STEPS = 64
+
+
+_NO_PAIRS = np.zeros((0, 2), np.int64)
+
+
+class _Rows:
+    """Arrays of one length, a row per pair; `pairs` comes first."""
+
+    pairs: IntArray
+
+    @classmethod
+    def _columns(cls) -> list[str]:
+        return [field.name for field in fields(cls)]  # type: ignore[arg-type]  # every subclass is a dataclass
+
+    def take(self, rows: IntArray | BoolArray) -> Self:
+        """The listed rows."""
+        return type(self)(*(getattr(self, name)[rows] for name in self._columns()))
+
+    @classmethod
+    def joined(cls, parts: list[Self]) -> Self:
+        """All rows, sorted by pair."""
+        whole = cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls._columns()))
+        return whole.take(np.lexsort(whole.pairs.T[::-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Unsupported(_Rows):
+    """Pairs no kernel answers."""
+
+    pairs: IntArray  #: (k, 2)
+    reason: NDArray[np.object_]  #: (k,) str
+
+    @classmethod
+    def none(cls) -> Unsupported:
+        """No pair."""
+        return cls(_NO_PAIRS, np.empty(0, dtype=object))
+
+    @classmethod
+    def of_kinds(cls, world: World, pairs: IntArray, text: str) -> Unsupported:
+        """With a reason that names the kinds where `text` has a placeholder."""
+        names, which = world.pair_kinds(pairs)
+        return cls(pairs, np.array([text.format(name) for name in names], dtype=object)[which])
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceRows(_Rows):
+    """Distances of pairs; points and normals (k, 3) in the fixed frame."""
+
+    pairs: IntArray
+    distance: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    point_a: FloatArray
+    point_b: FloatArray
+    normal: FloatArray
+    status: ByteArray
+    uncertainty: FloatArray  #: sum of what the two objects may be off [m]
+
+    @classmethod
+    def none(cls) -> DistanceRows:
+        """No pair."""
+        number, point = np.zeros(0), np.zeros((0, 3))
+        return cls(_NO_PAIRS, number, number, number, point, point, point, np.zeros(0, np.uint8), number)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRows(_Rows):
+    """First contacts of pairs; normals (k, 3) and contact points in the fixed frame."""
+
+    pairs: IntArray
+    status: ByteArray
+    time: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    last_time: FloatArray
+    normal: FloatArray
+    points: NDArray[np.object_]  #: (k,) contact set (m, 3) of every row, or None
+
+    @classmethod
+    def silent(cls, pairs: IntArray) -> ContactRows:
+        """Rows of pairs nothing is known about."""
+        count = len(pairs)
+        status, unknown = np.full(count, ContactStatus.UNSUPPORTED, np.uint8), np.full(count, np.nan)
+        normal, points = np.full((count, 3), np.nan), np.empty(count, dtype=object)
+        return cls(pairs, status, unknown, unknown, unknown, unknown, normal, points)
+
+
+def count_kinds(world: World, pairs: IntArray, counts: Counter[str]) -> None:
+    """Count the engine's work by kinds: "narrow box-sphere"."""
+    names, which = world.pair_kinds(pairs)
+    for name, number in zip(names, np.bincount(which, minlength=len(names)).tolist(), strict=True):
+        counts[f"narrow {name}"] += number
+
+
+# --------------------------------------------------------------------------------------------------- distance
+
+
+def distance_rows(
+    world: World, pairs: IntArray, penetration: bool, counts: Counter[str]
+) -> tuple[DistanceRows, Unsupported]:
+    """Distance of every pair, and the pairs that have no kernel."""
+    planar = world.planar[pairs[:, 0]]
+    solids, polygons = pairs[~planar], pairs[planar]
+    kinds = world.kinds[solids]
+    answered = supported_kinds()[kinds[:, 0], kinds[:, 1]]
+    parts = [DistanceRows.none()]
+    for part, kernel in ((solids[answered], _solid_distances), (polygons, _polygon_distances)):
+        if len(part):
+            count_kinds(world, part, counts)
+            parts.append(kernel(world, part, penetration))
+    rows = DistanceRows.joined(parts)
+    # A kernel may decline a pair for other reasons than its kinds, such as two half spaces.
+    declined = rows.status == DistanceStatus.UNSUPPORTED
+    missing = np.concatenate([solids[~answered], rows.pairs[declined]])
+    unsupported = Unsupported.of_kinds(world, missing, "distance {} is unsupported in this version")
+    return rows.take(~declined), Unsupported.joined([unsupported])
+
+
+def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+    i, j = pairs[:, 0], pairs[:, 1]
+    start, turn = world.poses[i, :3], world.rotations[i]
+    step, lost = _difference(world.poses[j, :3], start)
+    position = np.einsum("kji,kj->ki", turn, step)
+    poses_ab = np.column_stack([position, _relative_quaternions(world.poses[i, 3:], world.poses[j, 3:])])
+    gap, lower, upper, point_a, point_b, normal, status = _core.distance_pairs(
+        *world.table.packed, np.ascontiguousarray(world.shape[pairs]), poses_ab, penetration
+    )
+    rounding = np.where(
+        world.unrotated[i] & world.unrotated[j],
+        0.0,
+        RELATIVE_POSE_ROUNDING * _arm(world, i, j, np.linalg.norm(position, axis=1)),
+    )
+    uncertainty = world.uncertainty[i] + world.uncertainty[j]
+    lower, upper = _widened(lower, upper, uncertainty + rounding + lost, penetration)
+    return DistanceRows(
+        pairs,
+        gap,
+        lower,
+        upper,
+        np.einsum("kij,kj->ki", turn, point_a) + start,
+        np.einsum("kij,kj->ki", turn, point_b) + start,
+        np.einsum("kij,kj->ki", turn, normal),
+        status,
+        uncertainty,
+    )
+
+
+def _difference(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A - b by rows, rounded, and the length (k,) that rounding took away, exactly but for its own last bits.
+
+    Knuth's two-sum: a body at rest relative to a round number of metres loses nothing, and its interval shows
+    it.
+    """
+    difference = a - b
+    taken = a - difference
+    error = np.abs((a - (difference + taken)) + (taken - b)).sum(axis=1)
+    return difference, error
+
+
+def _relative_quaternions(a: FloatArray, b: FloatArray) -> FloatArray:
+    """conj(a) b, x y z w."""
+    ax, ay, az, aw = a.T
+    bx, by, bz, bw = b.T
+    return np.column_stack(
+        [
+            aw * bx - ax * bw - ay * bz + az * by,
+            aw * by + ax * bz - ay * bw - az * bx,
+            aw * bz - ax * by + ay * bx - az * bw,
+            aw * bw + ax * bx + ay * by + az * bz,
+        ]
+    )
+
+
+def _arm(world: World, i: IntArray, j: IntArray, apart: FloatArray) -> FloatArray:
+    """r_a + r_b + |p_ab|: how far from the origins the rounding of a rotation is felt."""
+    reach_a, reach_b = world.table.reach[world.shape[i]], world.table.reach[world.shape[j]]
+    # Of a half space, what counts is where the other body is and how far off the boundary lies.
+    offset = np.abs(world.table.packed.params[:, 3])
+    for reach, other, rows in ((reach_a, reach_b, i), (reach_b, reach_a, j)):
+        unbounded = np.isinf(reach) & np.isfinite(other)
+        reach[unbounded] = (apart + other + offset[world.shape[rows]])[unbounded]
+    return reach_a + reach_b + apart
+
+
+def _polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+    rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
+    gap, lower, upper, point_a, point_b, normal, status = _core.distance_polygons(*rings, penetration)
+    uncertainty = world.uncertainty[pairs].sum(axis=1)
+    lower, upper = _widened(lower, upper, uncertainty, penetration)
+    return DistanceRows(
+        pairs,
+        gap,
+        lower,
+        upper,
+        _in_space(point_a),
+        _in_space(point_b),
+        _in_space(normal),
+        status,
+        uncertainty,
+    )
+
+
+def _in_space(plane: FloatArray) -> FloatArray:
+    """(k, 2) -> (k, 3) with z = 0, or NaN where there is no point."""
+    return np.column_stack([plane, 0.0 * plane[:, :1]])
+
+
+def _widened(lower: FloatArray, upper: FloatArray, by: FloatArray, signed: bool) -> tuple[FloatArray, FloatArray]:
+    """Interval of a distance between bodies that may be off by so much in all; unchanged where that is 0."""
+    low = np.where(by > 0.0, np.nextafter(lower - by, -np.inf), lower)
+    high = np.where(by > 0.0, np.nextafter(upper + by, np.inf), upper)
+    return low if signed else np.maximum(low, 0.0), high
+
+
+# ---------------------------------------------------------------------------------------------- first contact
+
+
+def first_contact_rows(
+    world: World, pairs: IntArray, horizon: float, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
+    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
+    planar = world.planar[pairs[:, 0]]
+    turning = world.turns[pairs].any(axis=1)
+    sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar]
+    if len(sliding) + len(spinning):
+        count_kinds(world, pairs[planar], counts)
+    rows, unsupported = [ContactRows.silent(_NO_PAIRS)], [Unsupported.none()]
+    if len(sliding):
+        rows.append(_sliding_polygons(world, sliding, horizon, counts))
+    if len(spinning):
+        answered, missing = _spinning_polygons(world, spinning)
+        rows.append(answered)
+        unsupported.append(missing)
+    if len(solids):
+        answered, missing = _solid_contacts(world, solids, horizon, counts)
+        rows.append(answered)
+        unsupported.append(missing)
+    return ContactRows.joined(rows), Unsupported.joined(unsupported)
+
+
+def _sliding_polygons(world: World, pairs: IntArray, horizon: float, counts: Counter[str]) -> ContactRows:
+    """Polygons in translation."""
+    rows = _polygon_contacts(world, pairs, world.twists[:, :2], horizon)
+    uncertainty = world.uncertainty[pairs].sum(axis=1)
+    if not uncertainty.any():
+        return rows.take(rows.status != ContactStatus.NEVER)
+    never = rows.status == ContactStatus.NEVER
+    hits = np.flatnonzero(~never & (uncertainty > 0.0))
+    counts["uncertain"] += len(hits)
+    speed, normal = _relative_velocity(world, pairs[hits]), rows.normal[hits, :2]
+    rows.lower[hits] = _earlier(rows.lower[hits], uncertainty[hits], speed, normal)
+    rows.upper[hits] = _later(world, rows.take(hits), uncertainty[hits], horizon)
+    close = np.flatnonzero(never & (uncertainty > 0.0))
+    start = _approach(world, pairs[close], uncertainty[close], horizon, counts)
+    rows.lower[close], rows.upper[close] = start, np.where(np.isnan(start), np.nan, np.inf)
+    return rows.take(~never | ~np.isnan(rows.lower))
+
+
+def _polygon_contacts(world: World, pairs: IntArray, velocities: FloatArray, horizon: float) -> ContactRows:
+    """The engine's answer for polygons with the given velocities."""
+    rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
+    velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k]]) for k in range(2))
+    status, time, lower, upper, last, normal, points, offsets = _core.first_contact_polygons(
+        *rings, velocity_a, velocity_b, horizon, True
+    )
+    sets = np.empty(len(pairs), dtype=object)
+    space = _in_space(points)
+    for k in np.flatnonzero(np.diff(offsets)).tolist():
+        sets[k] = space[offsets[k] : offsets[k + 1]]
+    return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets)
+
+
+def _relative_velocity(world: World, pairs: IntArray) -> FloatArray:
+    """(k, 2): velocity of a as seen from b."""
+    velocity: FloatArray = world.twists[pairs[:, 0], :2] - world.twists[pairs[:, 1], :2]
+    return velocity
+
+
+def _closing_speed(velocity: FloatArray, normal: FloatArray, sign: float) -> FloatArray:
+    """Speed at which a comes nearer to b along the normal; moved up or down by more than its rounding."""
+    # Product, sum and subtraction of the velocities: 4 u; the normal itself is good to a few u.
+    slack = 16.0 * ROUNDOFF * np.abs(velocity).sum(axis=1)
+    closing: FloatArray = np.einsum("ki,ki->k", velocity, normal)
+    return closing + sign * slack
+
+
+def _earlier(time: FloatArray, by: FloatArray, velocity: FloatArray, normal: FloatArray) -> FloatArray:
+    """Earliest possible contact of bodies larger by `by` in all: they meet no sooner than their contact lines."""
+    closing = _closing_speed(velocity, normal, -1.0)
+    lead = np.divide(by, closing, out=np.full_like(by, np.inf), where=closing > 0.0)
+    return np.maximum(np.nextafter(time - lead, -np.inf), 0.0)
+
+
+def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> FloatArray:
+    """Latest possible contact of bodies that are smaller by `by` in all; inf if they may miss.
+
+    The signed distance f of translating convex bodies is a convex function of time, 0 at first contact t.  If
+    it is -depth at some later m, it lies below the chord from (t, 0) to (m, -depth), so it has come down to
+    -by no later than t + (m - t) by / depth.
+
+          f |
+          0 +--- t -------------- m --->
+            |      `.             .
+        -by +........`.           .
+            |           `.        .
+     -depth +..............`......+
+    """
+    end = np.minimum(rows.last_time, horizon)
+    middle = np.where((rows.status == ContactStatus.OVERLAPPING) | np.isinf(end), rows.time, 0.5 * (rows.time + end))
+    depth = -_distance_at(world, rows.pairs, middle, True)[2]
+    deep = depth >= by
+    share = np.divide(by, depth, out=np.zeros_like(by), where=deep)
+    latest = rows.upper + share * (middle - rows.time) * (1.0 + 8.0 * ROUNDOFF)
+    latest = np.where(middle > rows.time, np.nextafter(latest, np.inf), rows.upper)
+    return np.where(deep, latest, np.inf)
+
+
+def _distance_at(
+    world: World, pairs: IntArray, time: FloatArray, signed: bool
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Distance of translating polygons at the given times: value, lower, upper, normal (k, 2)."""
+    ring_a, offsets_a = gather(*world.rings, pairs[:, 0])
+    ring_b, offsets_b = gather(*world.rings, pairs[:, 1])
+    moved = ring_a + np.repeat(_relative_velocity(world, pairs) * time[:, None], np.diff(offsets_a), axis=0)
+    answer = _core.distance_polygons(moved, offsets_a, ring_b, offsets_b, signed)
+    return answer[0], answer[1], answer[2], answer[5]
+
+
+def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, counts: Counter[str]) -> FloatArray:
+    """(k,) time until which polygons in translation are surely more than `by` apart; NaN if to the end.
+
+    Conservative advancement: the line through b's nearest point, perpendicular to the shortest way, is
+    reached no sooner than gap / closing speed from now.
+    """
+    time = np.zeros(len(pairs))
+    open_rows = np.arange(len(pairs))
+    for _ in range(MAX_APPROACH_STEPS):
+        if not len(open_rows):
+            break
+        counts["approach steps"] += len(open_rows)
+        here = pairs[open_rows]
+        _, lower, _, normal = _distance_at(world, here, time[open_rows], False)
+        gap = lower - by[open_rows]
+        closing = _closing_speed(_relative_velocity(world, here), normal, 1.0)
+        step = np.divide(gap, closing, out=np.full_like(gap, np.inf), where=closing > 0.0)
+        reached = gap <= 0.0
+        time[open_rows] += np.where(reached, 0.0, step)
+        time[open_rows[time[open_rows] > horizon]] = np.nan
+        open_rows = open_rows[~reached & np.isfinite(time[open_rows])]
+    return np.where(np.isfinite(time), time, np.nan)
+
+
+def _spinning_polygons(world: World, pairs: IntArray) -> tuple[ContactRows, Unsupported]:
+    """Polygons that turn: in contact now, or unsupported."""
+    rows = _polygon_contacts(world, pairs, np.zeros((len(world), 2)), 0.0)
+    apart = rows.status == ContactStatus.NEVER
+    rows.status[apart] = ContactStatus.UNSUPPORTED
+    rows.last_time[:] = np.nan
+    certain = -_distance_at(world, pairs, np.zeros(len(pairs)), True)[2] >= world.uncertainty[pairs].sum(axis=1)
+    rows.upper[~apart & ~certain] = np.inf
+    reason = np.full(int(apart.sum()), "first contact of a polygon with angular velocity is unsupported", dtype=object)
+    return rows, Unsupported(pairs[apart], reason)
+
+
+def _solid_contacts(
+    world: World, pairs: IntArray, horizon: float, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
+    """Solids: in contact now, at rest relative to each other and so never, or unsupported."""
+    rows, missing = distance_rows(world, pairs, True, counts)
+    motion = world.twists[rows.pairs]
+    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~motion[:, :, 3:].any(axis=(1, 2))
+    touching, may_touch = rows.distance <= 0.0, rows.lower <= 0.0
+    status = np.select(
+        [rows.distance < 0.0, touching, ~resting, rows.status == DistanceStatus.NOT_CONVERGED],
+        [
+            ContactStatus.OVERLAPPING,
+            ContactStatus.TOUCHING,
+            ContactStatus.UNSUPPORTED,
+            ContactStatus.NOT_CONVERGED,
+        ],
+        ContactStatus.NEVER,
+    ).astype(np.uint8)
+    now = np.where(touching, 0.0, np.nan)
+    known = touching | (resting & may_touch)
+    points = np.empty(len(status), dtype=object)
+    for k in np.flatnonzero(touching).tolist():
+        points[k] = rows.point_a[k : k + 1]  # the deepest point of a in b belongs to both
+    answered = ContactRows(
+        rows.pairs,
+        status,
+        now,
+        np.where(known, 0.0, np.nan),
+        np.where(known, np.where(rows.upper <= 0.0, 0.0, np.inf), np.nan),
+        np.where(touching & resting, horizon, np.nan),
+        np.where(touching[:, None], rows.normal, np.nan),
+        points,
+    )
+    moving = status == ContactStatus.UNSUPPORTED
+    unsupported = Unsupported.joined(
+        [
+            missing,
+            Unsupported.of_kinds(world, rows.pairs[moving], "first contact of moving solids ({}) is unsupported"),
+        ]
+    )
+    return ContactRows.joined([answered.take(known | moving), ContactRows.silent(missing.pairs)]), unsupported

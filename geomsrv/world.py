@@ -1,0 +1,250 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""One version of a scene as arrays, a row per object.  Immutable; queries read it and nothing else.
+
+`ShapeTable` holds what stays when things move and is made once for a set of shapes; `World` adds where they
+are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from geomsrv import _core, _validate
+from geomsrv.answers import BoolArray, ByteArray, FloatArray, IntArray
+from geomsrv.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Ellipsoid,
+    Frustum,
+    HalfSpace,
+    PackedShapes,
+    Polygon,
+    Shape,
+    Sphere,
+    pack,
+)
+
+__all__ = ["ROUNDOFF", "ShapeTable", "World", "gather", "supported_kinds"]
+
+AnyShape = Shape | Frustum
+
+ROUNDOFF = 2.0**-53  #: largest relative error of one float64 operation
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTable:
+    """Distinct shapes, a row each; n objects may share one.
+
+    Attributes
+    ----------
+    shapes : tuple of Shape
+    packed : PackedShapes
+        As the engine reads them.
+    kind_names, kind : tuple of str, (m,) int64
+        Kinds that occur, sorted, and which of them each shape is.
+    planar, unbounded : (m,) bool
+        Polygons; half spaces.
+    center, half, round : (m, 3), (m, 3), (m,) float64
+        The shape lies in the box center +- half, grown by `round` on all sides, in its own frame; 0 for half
+        spaces.
+    reach : (m,) float64
+        Distance of the shape's farthest point from its origin; inf for half spaces.
+    ring_vertices, ring_offsets : (k, 2) float64, (m + 1,) int64
+        Vertices of the polygons; no rows for solids.
+    """
+
+    shapes: tuple[AnyShape, ...]
+    packed: PackedShapes
+    kind_names: tuple[str, ...]
+    kind: IntArray
+    planar: BoolArray
+    unbounded: BoolArray
+    center: FloatArray
+    half: FloatArray
+    round: FloatArray
+    reach: FloatArray
+    ring_vertices: FloatArray
+    ring_offsets: IntArray
+
+    @classmethod
+    def of(cls, shapes: Iterable[AnyShape]) -> ShapeTable:
+        """Table of the given shapes, in this order."""
+        rows = tuple(shapes)
+        packed = pack(rows)
+        bounds = np.array([_bounds(shape) for shape in rows], dtype=np.float64).reshape(len(rows), 8)
+        rings = [shape.vertices if isinstance(shape, Polygon) else np.zeros((0, 2)) for shape in rows]
+        names = sorted({shape.kind for shape in rows})
+        return cls(
+            shapes=rows,
+            packed=packed,
+            kind_names=tuple(names),
+            kind=np.array([names.index(shape.kind) for shape in rows], dtype=np.int64),
+            planar=np.array([isinstance(shape, Polygon) for shape in rows], dtype=bool),
+            unbounded=np.array([isinstance(shape, HalfSpace) for shape in rows], dtype=bool),
+            center=np.ascontiguousarray(bounds[:, 0:3]),
+            half=np.ascontiguousarray(bounds[:, 3:6]),
+            round=np.ascontiguousarray(bounds[:, 6]),
+            reach=np.ascontiguousarray(bounds[:, 7]),
+            ring_vertices=np.concatenate([np.zeros((0, 2)), *rings]),
+            ring_offsets=np.cumsum([0, *(len(ring) for ring in rings)], dtype=np.int64),
+        )
+
+
+def _bounds(shape: AnyShape) -> tuple[float, ...]:
+    """Center, half extents, rounding radius, reach of a shape in its own frame.
+
+    The last bit of `half` and `reach` may be lost; whoever places the shape adds a bound for all rounding.
+    """
+    half: Sequence[float] = (0.0, 0.0, 0.0)
+    grown = 0.0
+    if isinstance(shape, Sphere):
+        grown = reach = shape.radius
+    elif isinstance(shape, Capsule):
+        half, grown = (0.0, 0.0, shape.length / 2.0), shape.radius
+        reach = shape.length / 2.0 + shape.radius
+    elif isinstance(shape, Cylinder | Cone):
+        half = (shape.radius, shape.radius, shape.length / 2.0)
+        reach = float(np.hypot(shape.radius, shape.length / 2.0))
+    elif isinstance(shape, Box):
+        half = shape.half_extents.tolist()
+        reach = float(np.linalg.norm(shape.half_extents))
+    elif isinstance(shape, Ellipsoid):
+        half, reach = shape.radii.tolist(), float(shape.radii.max())
+    elif isinstance(shape, HalfSpace):
+        reach = np.inf
+    else:
+        points = shape.corners() if isinstance(shape, Frustum) else shape.vertices  # type: ignore[attr-defined]
+        if len(points) == 0:  # a mesh without vertices: nothing to meet
+            return (0.0,) * 8
+        if isinstance(shape, Polygon):
+            points = np.column_stack([points, np.zeros(len(points))])
+        low, high = points.min(axis=0), points.max(axis=0)
+        center = 0.5 * low + 0.5 * high
+        extent = np.maximum(high - center, center - low)
+        return (*center, *extent, 0.0, float(np.linalg.norm(points, axis=1).max()))
+    return (0.0, 0.0, 0.0, *half, grown, reach)
+
+
+@lru_cache(maxsize=1)
+def supported_kinds() -> BoolArray:
+    """(k, k) bool: kinds, by their code in a packed table, whose distance the engine answers."""
+    return _core.supported_pairs()
+
+
+def gather(vertices: FloatArray, offsets: IntArray, rows: IntArray) -> tuple[FloatArray, IntArray]:
+    """The listed rows of a ragged array, end to end, and their offsets."""
+    counts = offsets[rows + 1] - offsets[rows]
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    # Position k of the output belongs to the item whose stretch it falls in, and lies as far into it.
+    source = np.arange(ends[-1]) + np.repeat(offsets[rows] - ends[:-1], counts)
+    return vertices[source], ends
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Objects in the order of their ids, all in the fixed frame.
+
+    Attributes
+    ----------
+    ids : tuple of str
+        Sorted, so that rows sorted by index are sorted by id, in whatever order the objects came.
+    index : mapping of str to int
+        Row of each id.
+    table : ShapeTable
+    shape : (n,) int64
+        Row of the table of each object.
+    uncertainty : (n,) float64
+    poses, twists : (n, 7), (n, 6) float64
+    allowed : (p,) int64
+        Sorted keys ``i * n + j``, i < j, of the present pairs that are ignored.
+    version : int
+    stamp : object
+    """
+
+    ids: tuple[str, ...]
+    index: Mapping[str, int]
+    table: ShapeTable
+    shape: IntArray
+    uncertainty: FloatArray
+    poses: FloatArray
+    twists: FloatArray
+    allowed: IntArray
+    version: int
+    stamp: Any
+
+    @classmethod
+    def empty(cls) -> World:
+        """Nothing yet."""
+        rows = np.zeros(0, np.int64)
+        nothing = np.zeros(0)
+        return cls((), {}, ShapeTable.of(()), rows, nothing, np.zeros((0, 7)), np.zeros((0, 6)), rows, 0, None)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @cached_property
+    def rotations(self) -> FloatArray:
+        """(n, 3, 3) float64, v_fixed = R v_body: computed once and from then on taken literally."""
+        return _validate.rotation_matrices(self.poses[:, 3:])
+
+    @cached_property
+    def unrotated(self) -> BoolArray:
+        """(n,) bool: the rotation is the identity, exactly."""
+        return ~self.poses[:, 3:6].any(axis=1)
+
+    @cached_property
+    def kinds(self) -> ByteArray:
+        """(n,) uint8: code of each object's kind."""
+        return self.table.packed.kinds[self.shape]
+
+    @cached_property
+    def planar(self) -> BoolArray:
+        """(n,) bool: polygons in the plane z = 0."""
+        return self.table.planar[self.shape]
+
+    @cached_property
+    def families(self) -> tuple[IntArray, IntArray]:
+        """Rows of the solids and rows of the polygons: only members of one family are compared."""
+        return np.flatnonzero(~self.planar), np.flatnonzero(self.planar)
+
+    @cached_property
+    def moves(self) -> BoolArray:
+        """(n,) bool: has a linear velocity."""
+        return self.twists[:, :3].any(axis=1)
+
+    @cached_property
+    def turns(self) -> BoolArray:
+        """(n,) bool: has an angular velocity."""
+        return self.twists[:, 3:].any(axis=1)
+
+    @cached_property
+    def rings(self) -> tuple[FloatArray, IntArray]:
+        """Vertices (k, 2) and offsets (n + 1,) of all polygons in the plane; solids have none.
+
+        A polygon is placed once: these numbers, rounded, are from then on taken literally.
+        """
+        vertices, offsets = gather(self.table.ring_vertices, self.table.ring_offsets, self.shape)
+        owner = np.repeat(np.arange(len(self)), np.diff(offsets))
+        turn = self.rotations[:, :2, :2][owner]
+        return np.einsum("kij,kj->ki", turn, vertices) + self.poses[owner, :2], offsets
+
+    def kind_counts(self, rows: IntArray) -> dict[str, int]:
+        """How many of the given objects there are of each kind, by name."""
+        counts = np.bincount(self.table.kind[self.shape[rows]], minlength=len(self.table.kind_names))
+        return {name: int(k) for name, k in zip(self.table.kind_names, counts, strict=True) if k}
+
+    def pair_kinds(self, pairs: IntArray) -> tuple[list[str], IntArray]:
+        """Names of the kind pairs that occur, such as "box-sphere", and which of them each pair is."""
+        names = self.table.kind_names
+        kinds = self.table.kind[self.shape[pairs]]
+        codes = kinds.min(axis=1, initial=len(names)) * len(names) + kinds.max(axis=1, initial=0)
+        present, which = np.unique(codes, return_inverse=True)
+        return [f"{names[code // len(names)]}-{names[code % len(names)]}" for code in present.tolist()], which
