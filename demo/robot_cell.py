@@ -334,8 +334,8 @@ def run(console: Console, path: Path) -> None:
     allowed = cell.allowed_pairs(panda)
     vertices = sum(len(o.shape.vertices) for o in links if isinstance(o.shape, gs.Convex))
     console.print(
-        f"Panda: {len(links)} collision geometries, {vertices} hull vertices, {len(panda.allowed_pairs)} allowed pairs; "
-        f"{len(furniture)} other objects\n"
+        f"Panda: {len(links)} collision geometries, {vertices} hull vertices, {len(panda.allowed_pairs)} allowed pairs, "
+        f"and {len(furniture)} other objects\n"
     )
     client = Client()
     stream = None
