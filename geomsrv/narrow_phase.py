@@ -19,7 +19,7 @@ from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
 from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 
-__all__ = ["ContactRows", "DistanceRows", "distance_rows", "first_contact_rows"]
+__all__ = ["ContactRows", "DistanceRows", "distance_rows", "first_contact_rows", "relative_poses"]
 
 # How much the rounded relative pose may move one body against the other, in terms of r_a + r_b + |p_ab|, r
 # the reach of a body from its origin.  With u = 2^-53 and Q the exact rotation of a unit quaternion that is
@@ -153,20 +153,13 @@ def distance_rows(
 
 def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
     i, j = pairs[:, 0], pairs[:, 1]
-    start, turn = world.poses[i, :3], world.rotations[i]
-    step, lost = _difference(world.poses[j, :3], start)
-    position = np.einsum("kji,kj->ki", turn, step)
-    poses_ab = np.column_stack([position, _relative_quaternions(world.poses[i, 3:], world.poses[j, 3:])])
+    poses_ab = relative_poses(world, pairs)
     gap, lower, upper, point_a, point_b, normal, status = _core.distance_pairs(
         *world.table.packed, np.ascontiguousarray(world.shape[pairs]), poses_ab, penetration
     )
-    rounding = np.where(
-        world.unrotated[i] & world.unrotated[j],
-        0.0,
-        RELATIVE_POSE_ROUNDING * _arm(world, i, j, np.linalg.norm(position, axis=1)),
-    )
     uncertainty = world.uncertainty[i] + world.uncertainty[j]
-    lower, upper = _widened(lower, upper, uncertainty + rounding + lost, penetration)
+    lower, upper = _widened(lower, upper, uncertainty + _pose_rounding(world, pairs, poses_ab), penetration)
+    turn, start = world.rotations[i], world.poses[i, :3]
     return DistanceRows(
         pairs,
         gap,
@@ -180,30 +173,42 @@ def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> Distan
     )
 
 
-def _difference(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A - b by rows, rounded, and the length (k,) that rounding took away, exactly but for its own last bits.
-
-    Knuth's two-sum: a body at rest relative to a round number of metres loses nothing, and its interval shows
-    it.
-    """
-    difference = a - b
-    taken = a - difference
-    error = np.abs((a - (difference + taken)) + (taken - b)).sum(axis=1)
-    return difference, error
-
-
-def _relative_quaternions(a: FloatArray, b: FloatArray) -> FloatArray:
-    """conj(a) b, x y z w."""
-    ax, ay, az, aw = a.T
-    bx, by, bz, bw = b.T
+def relative_poses(world: World, pairs: IntArray) -> FloatArray:
+    """(k, 7) pose of the second object of each pair in the first."""
+    i, j = pairs[:, 0], pairs[:, 1]
+    step = world.poses[j, :3] - world.poses[i, :3]
+    ax, ay, az, aw = world.poses[i, 3:].T
+    bx, by, bz, bw = world.poses[j, 3:].T
     return np.column_stack(
         [
+            np.einsum("kji,kj->ki", world.rotations[i], step),
+            # conj(a) b
             aw * bx - ax * bw - ay * bz + az * by,
             aw * by + ax * bz - ay * bw - az * bx,
             aw * bz - ax * by + ay * bx - az * bw,
             aw * bw + ax * bx + ay * by + az * bz,
         ]
     )
+
+
+def _pose_rounding(world: World, pairs: IntArray, poses_ab: FloatArray) -> FloatArray:
+    """(k,) how much the distance of a pair may have changed because its relative pose is rounded [m]."""
+    i, j = pairs[:, 0], pairs[:, 1]
+    arm = _arm(world, i, j, np.linalg.norm(poses_ab[:, :3], axis=1))
+    turned = ~(world.unrotated[i] & world.unrotated[j])
+    rounding = np.where(turned, RELATIVE_POSE_ROUNDING * arm, 0.0)
+    return rounding + _lost(world.poses[j, :3], world.poses[i, :3])
+
+
+def _lost(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(k,) length that rounding took from a - b, by rows; 0 where that is exact.
+
+    Knuth's two-sum: bodies at round numbers of metres lose nothing, and their interval shows it.
+    """
+    difference = a - b
+    taken = a - difference
+    lost: FloatArray = np.abs((a - (difference + taken)) + (taken - b)).sum(axis=1)
+    return lost
 
 
 def _arm(world: World, i: IntArray, j: IntArray, apart: FloatArray) -> FloatArray:

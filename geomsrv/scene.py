@@ -293,6 +293,16 @@ class Scene:
         self._stamp: Any = None
 
     @property
+    def world(self) -> World:
+        """This version as arrays, a row per object; never changes."""
+        with self._lock:
+            if self._outdated:
+                self._world = self._rebuilt()
+                self._outdated = False
+                self._replaced = set()
+            return self._world
+
+    @property
     def version(self) -> int:
         """Grows by one with every change that took effect; 0 at first."""
         return self._version
@@ -305,7 +315,7 @@ class Scene:
     @property
     def ids(self) -> tuple[str, ...]:
         """Every object's id, sorted."""
-        return self._snapshot().ids
+        return self.world.ids
 
     @property
     def allowed_pairs(self) -> frozenset[Pair]:
@@ -323,7 +333,7 @@ class Scene:
 
     def __getitem__(self, name: str) -> SceneObject:
         """The object as it is now, in the fixed frame; KeyError for an unknown id."""
-        world = self._snapshot()
+        world = self.world
         row = world.index[name]
         return SceneObject(
             id=name,
@@ -405,7 +415,7 @@ class Scene:
             An array has the wrong shape or dtype.
         """
         with self._lock:
-            world = self._snapshot()
+            world = self.world
             rows = self._resolve(ids, world)
             poses = _array(poses, "poses", (len(rows), 7))
             twists = None if twists is None else _array(twists, "twists", (len(rows), 6))
@@ -489,7 +499,7 @@ class Scene:
         start = time.perf_counter_ns()
         tier = _validate.accuracy(accuracy)
         penetration = "penetration" in _validate.want(want, EFFECTS)
-        world = self._snapshot()
+        world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         rows, unsupported = nearest_rows(world, penetration, selection, counts)
@@ -527,7 +537,7 @@ class Scene:
         start = time.perf_counter_ns()
         limit = _limit(horizon, "horizon")
         tier = _validate.accuracy(accuracy)
-        world = self._snapshot()
+        world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_swept(world, limit), 0.0, selection, counts)
@@ -576,7 +586,7 @@ class Scene:
         tier = _validate.accuracy(accuracy)
         if not isinstance(frustum, Frustum):
             raise GeometryError(f"frustum must be Frustum, got {type(frustum).__name__}")
-        world = self._snapshot()
+        world = self.world
         rows = np.arange(len(world)) if ids is None else np.flatnonzero(_members(world, ids, "ids"))
         counts: Counter[str] = Counter(objects=len(rows))
         state, certain, boxed = sight(world, rows, frustum, counts)
@@ -593,19 +603,10 @@ class Scene:
 
     def plan(self) -> str:
         """In words, line by line: what each query computes for what is in the scene, and what is skipped and why."""
-        world = self._snapshot()
+        world = self.world
         return describe(world, self.fixed_frame, len(self._allowed))
 
     # ----------------------------------------------------------------------------------------------- internals
-
-    def _snapshot(self) -> World:
-        """The scene as queries see it."""
-        with self._lock:
-            if self._outdated:
-                self._world = self._rebuilt()
-                self._outdated = False
-                self._replaced = set()
-            return self._world
 
     def _rebuilt(self) -> World:
         old, ids = self._world, tuple(sorted(self._objects))
@@ -703,7 +704,7 @@ class Scene:
     ) -> PairDistances:
         tier = _validate.accuracy(accuracy)
         penetration = "penetration" in _validate.want(want, EFFECTS)
-        world = self._snapshot()
+        world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_now(world), limit, selection, counts)
