@@ -5,6 +5,7 @@
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/polygon.hpp"
+#include "geom/polygon_first_contact.hpp"
 
 namespace geomsrv::bind {
 
@@ -31,6 +32,17 @@ private:
     std::size_t count_;
 };
 
+/// Item i of n, or the only one.
+constexpr std::size_t item(std::size_t count, std::size_t i) { return count == 1 ? 0 : i; }
+
+std::size_t largest_ring(const Rings& rings) {
+    std::size_t largest = 1;
+    for (std::size_t i = 0; i < rings.size(); ++i) {
+        largest = std::max(largest, rings[i].size());
+    }
+    return largest;
+}
+
 constexpr std::string_view fault_text(RingFault fault) {
     switch (fault) {
         case RingFault::none:
@@ -43,6 +55,43 @@ constexpr std::string_view fault_text(RingFault fault) {
             return "wound more than once";
     }
     return "";
+}
+
+struct ContactRows {
+    std::uint8_t* status;
+    double* time;
+    double* time_lower;
+    double* time_upper;
+    double* last_time;
+    Vec2* normal;
+    std::int64_t* point_offsets;
+};
+
+/// Fills the rows and returns the contact points of all pairs, end to end.
+std::vector<Vec2> first_contacts(const Rings& a, const Rings& b, const Rows2& velocity_a,
+                                 const Rows2& velocity_b, double t_max, bool contact_set,
+                                 const ContactRows& rows) {
+    const std::size_t count = a.size() == 1 ? b.size() : a.size();
+    const auto* const va = reinterpret_cast<const Vec2*>(velocity_a.data());
+    const auto* const vb = reinterpret_cast<const Vec2*>(velocity_b.data());
+    std::vector<Vec2> points;
+    points.reserve(contact_set ? 2 * count : 0);
+    FirstContactSolver solver(largest_ring(a), largest_ring(b));
+    rows.point_offsets[0] = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const FirstContact contact =
+            solver.solve({a[item(a.size(), i)], va[item(velocity_a.shape(0), i)]},
+                         {b[item(b.size(), i)], vb[item(velocity_b.shape(0), i)]}, t_max, contact_set);
+        rows.status[i] = static_cast<std::uint8_t>(contact.status);
+        rows.time[i] = contact.time;
+        rows.time_lower[i] = contact.time_lower;
+        rows.time_upper[i] = contact.time_upper;
+        rows.last_time[i] = contact.last_time;
+        rows.normal[i] = contact.normal;
+        points.insert(points.end(), contact.points.begin(), contact.points.end());
+        rows.point_offsets[i + 1] = static_cast<std::int64_t>(points.size());
+    }
+    return points;
 }
 
 struct BatchReport {
@@ -76,6 +125,40 @@ void define_polygons(nb::module_& m) {
             return nb::make_tuple(first.ring, first.report.vertex, nb::str(text.data(), text.size()));
         },
         nb::arg("vertices").noconvert(), nb::arg("offsets").noconvert());
+    m.def(
+        "first_contact_polygons",
+        [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
+           const Offsets& offsets_b, const Rows2& velocity_a, const Rows2& velocity_b, double t_max,
+           bool contact_set) {
+            const Rings a(vertices_a, offsets_a);
+            const Rings b(vertices_b, offsets_b);
+            const std::size_t count = a.size() == 1 ? b.size() : a.size();
+            const auto status = empty<std::uint8_t>({count});
+            const auto time = empty<double>({count});
+            const auto time_lower = empty<double>({count});
+            const auto time_upper = empty<double>({count});
+            const auto last_time = empty<double>({count});
+            const auto normal = empty<double>({count, 2});
+            const auto point_offsets = empty<std::int64_t>({count + 1});
+            std::vector<Vec2> found;
+            {
+                const nb::gil_scoped_release unlocked;
+                found =
+                    first_contacts(a, b, velocity_a, velocity_b, t_max, contact_set,
+                                   {status.data, time.data, time_lower.data, time_upper.data, last_time.data,
+                                    reinterpret_cast<Vec2*>(normal.data), point_offsets.data});
+            }
+            const auto points = empty<double>({found.size(), 2});
+            if (!found.empty()) {
+                std::memcpy(points.data, found.data(), found.size() * sizeof(Vec2));
+            }
+            return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
+                                  last_time.array, normal.array, points.array, point_offsets.array);
+        },
+        nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
+        nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
+        nb::arg("velocity_a").noconvert(), nb::arg("velocity_b").noconvert(), nb::arg("t_max"),
+        nb::arg("contact_set"));
 }
 
 }  // namespace geomsrv::bind

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "geom/two_fold.hpp"
+
 namespace geomsrv {
 
 namespace {
@@ -85,9 +87,25 @@ private:
     int last_ = -1;
 };
 
+// Differences are exact, products carry 7 and their difference 3 units of kTwoFoldRoundoff; the rest covers
+// the bound.
+constexpr double kTwoFoldCrossError = 12.0 * kTwoFoldRoundoff;
+
+// Above it no part of a product that the bound counts underflows: 2^-900 * 2^-106 > 2^-1022.
+constexpr double kTwoFoldSmallest = 0x1p-900;
+
 }  // namespace
 
-int sign_of_cross_by_exact_sum(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v) {
+int sign_of_cross_beyond_filter(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v) {
+    const TwoFold left = two_difference(to_u.x, from_u.x) * two_difference(to_v.y, from_v.y);
+    const TwoFold right = two_difference(to_u.y, from_u.y) * two_difference(to_v.x, from_v.x);
+    const double magnitude = std::fabs(left.hi) + std::fabs(right.hi);
+    const double value = (left - right).hi;
+    // After an overflow something here is NaN, and neither comparison holds.
+    if (magnitude > kTwoFoldSmallest && std::fabs(value) > kTwoFoldCrossError * magnitude) {
+        return value > 0.0 ? 1 : -1;
+    }
+
     ProductSum sum;
     // (tx - fx)(ty' - fy') - (ty - fy)(tx' - fx'), multiplied out so that no difference is rounded.
     sum.add(to_u.x, to_v.y);

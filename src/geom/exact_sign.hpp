@@ -22,8 +22,8 @@ inline constexpr double kCrossError = 5.0 * kRoundoff;
 // products and in each of the two terms of the bound.
 inline constexpr double kCrossUnderflow = 4.0 * std::numeric_limits<double>::denorm_min();
 
-/// The exact sum behind `sign_of_cross`, for what its filter cannot decide.
-int sign_of_cross_by_exact_sum(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v);
+/// What `sign_of_cross` climbs on to where its filter cannot decide.
+int sign_of_cross_beyond_filter(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v);
 
 /// -1, 0 or +1: exact sign of cross(to_u - from_u, to_v - from_v), for any finite coordinates.
 inline int sign_of_cross(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v) {
@@ -40,11 +40,11 @@ inline int sign_of_cross(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v) {
     if (-value > bound) {
         return -1;
     }
-    // A rounded difference is zero only if the exact one is, so vanishing factors decide without the sum.
+    // A rounded difference is zero only if the exact one is, so vanishing factors decide by themselves.
     if ((u.x == 0.0 || v.y == 0.0) && (u.y == 0.0 || v.x == 0.0)) {
         return 0;
     }
-    return sign_of_cross_by_exact_sum(from_u, to_u, from_v, to_v);
+    return sign_of_cross_beyond_filter(from_u, to_u, from_v, to_v);
 }
 
 /// -1, 0 or +1: exact sign of dot(to_u - from_u, to_v - from_v), for any finite coordinates.

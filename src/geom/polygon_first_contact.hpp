@@ -1,0 +1,55 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// When and where two translating convex polygons first touch (book section 7.7).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "geom/polygon.hpp"
+#include "geom/polygon_overlap.hpp"
+#include "geom/polygon_pair.hpp"
+#include "geom/vec.hpp"
+
+namespace geomsrv {
+
+enum class ContactStatus : std::uint8_t {
+    never = 0,        ///< not within t_max
+    will_touch = 1,   ///< apart now, in contact at `time`
+    touching = 2,     ///< in contact now, without a common interior point
+    overlapping = 3,  ///< common interior points now
+};
+
+struct FirstContact {
+    ContactStatus status;
+    double time;                   ///< [s]; 0 if in contact now; NaN for never, like all numbers below
+    double time_lower;             ///< the exact time is not earlier,
+    double time_upper;             ///< and not later
+    double last_time;              ///< [s], at most t_max; infinite if they never part
+    Vec2 normal;                   ///< unit, from a to b, at `time`; NaN if overlapping
+    std::span<const Vec2> points;  ///< contact set at `time`, world frame; valid until the next call
+};
+
+/// Ring and constant velocity [m/s] in the world frame.
+struct MovingPolygon {
+    Ring ring;
+    Vec2 velocity;
+};
+
+/// Holds scratch memory for polygons of at most so many vertices, so that a query allocates nothing.
+class FirstContactSolver {
+public:
+    FirstContactSolver(std::size_t largest_a, std::size_t largest_b) : pair_(largest_a, largest_b) {}
+
+    /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
+    FirstContact solve(const MovingPolygon& a, const MovingPolygon& b, double t_max, bool contact_set);
+
+private:
+    PolygonPair pair_;
+    PolygonOverlap overlap_;
+    std::vector<Vec2> points_;
+};
+
+}  // namespace geomsrv

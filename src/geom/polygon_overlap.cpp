@@ -1,0 +1,101 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/polygon_overlap.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace geomsrv {
+
+namespace {
+
+/// p + t (q - p), also where the difference overflows.
+Vec2 between(Vec2 p, Vec2 q, double t) {
+    const Vec2 way = q - p;
+    return std::isfinite(way.x) && std::isfinite(way.y) ? p + t * way : (1.0 - t) * p + t * q;
+}
+
+/// Height of v over the line through p and q, or its distance from p if they are closer than `tolerance`.
+double height(Vec2 p, Vec2 q, Vec2 v, double tolerance) {
+    const Vec2 base = q - p;
+    const double length = std::hypot(base.x, base.y);
+    if (!(length > tolerance)) {
+        return std::hypot(v.x - p.x, v.y - p.y);
+    }
+    return std::fabs(cross((1.0 / length) * base, v - p));
+}
+
+}  // namespace
+
+void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack slack) {
+    const PairedPolygon& p = pair.side(side);
+    const PairedPolygon& q = pair.other(side);
+    // A segment is one edge, not two; a point an edge of no length.
+    const std::size_t edges = std::max<std::size_t>(p.edges == 2 ? 1 : p.edges, 1);
+    for (std::size_t i = 0; i < edges; ++i) {
+        const std::size_t end = p.next(i);
+        double enter = 0.0;
+        double leave = 1.0;
+        for (std::size_t k = 0; k < q.axes && enter <= leave; ++k) {
+            const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
+            const double level = pair.gap_error() * size + kPairUnderflow +
+                                 std::min(slack.noise * (size + pair.reach()), slack.limit * size);
+            const double from = dot(q.axis(k), p.local(i)) - q.own[k];
+            const double to = dot(q.axis(k), p.local(end)) - q.own[k];
+            if (from > level && to > level) {
+                leave = -1.0;
+            } else if (from > level) {
+                enter = std::max(enter, from / (from - to));
+            } else if (to > level) {
+                leave = std::min(leave, from / (from - to));
+            }
+        }
+        if (enter > leave) {
+            continue;
+        }
+        // The end of a whole edge is the start of the next one.
+        if (enter == 0.0) {
+            found_.push_back(p.ring[i]);
+        }
+        if (enter > 0.0) {
+            found_.push_back(between(p.ring[i], p.ring[end], enter));
+        }
+        if (leave < 1.0) {
+            found_.push_back(between(p.ring[i], p.ring[end], leave));
+        }
+        if (leave == 1.0 && p.edges == 2) {
+            found_.push_back(p.ring[end]);
+        }
+    }
+}
+
+std::span<const Vec2> PolygonOverlap::of(const PolygonPair& pair, Slack slack) {
+    found_.clear();
+    for (const int side : {0, 1}) {
+        add_part_inside(pair, side, slack);
+    }
+    if (found_.empty()) {
+        return {};
+    }
+    const Ring hull = hull_.of(found_);
+
+    // Where the polygons share a line, or cross in a vertex, rounding leaves vertices that are not there in
+    // truth.
+    const double tolerance = std::scalbn(2.0 * (pair.gap_error() + std::min(2.0 * slack.noise, slack.limit)),
+                                         -pair.scale_exponent());
+    merged_.assign(hull.begin(), hull.end());
+    for (std::size_t i = 0; merged_.size() > 1 && i < merged_.size();) {
+        const std::size_t n = merged_.size();
+        const Vec2 before = merged_[(i + n - 1) % n];
+        const Vec2 behind = merged_[(i + 1) % n];
+        const bool repeated = std::hypot(merged_[i].x - before.x, merged_[i].y - before.y) <= tolerance;
+        if (repeated || (n > 2 && height(before, behind, merged_[i], tolerance) <= tolerance)) {
+            merged_.erase(merged_.begin() + static_cast<std::ptrdiff_t>(i));
+        } else {
+            ++i;
+        }
+    }
+    return merged_;
+}
+
+}  // namespace geomsrv

@@ -1,0 +1,31 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Intersection of two convex polygons at rest.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "geom/polygon.hpp"
+#include "geom/polygon_pair.hpp"
+#include "geom/vec.hpp"
+
+namespace geomsrv {
+
+class PolygonOverlap {
+public:
+    /// Vertices of a's and b's intersection, given coordinates: strictly convex and counter-clockwise, or the
+    /// two ends of a segment, or one point; none if there is nothing within `tolerance(axis)` of both.
+    /// Vertices closer than `length` to each other or to the line through their neighbours are merged.  Valid
+    /// until the next call.
+    std::span<const Vec2> of(const PolygonPair& pair, Slack slack);
+
+private:
+    void add_part_inside(const PolygonPair& pair, int side, Slack slack);
+
+    std::vector<Vec2> found_;
+    std::vector<Vec2> merged_;
+    StrictHull hull_;
+};
+
+}  // namespace geomsrv

@@ -1,0 +1,168 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Two convex polygons and every axis that can separate them: what moving contact and distance have in common.
+//
+// The translations w for which b + w meets a form the convex polygon a - b.  Its edges are the edges of a and
+// (turned round) of b, so it is known by one half plane per edge:
+//
+//     axis k of a: outward normal D of its edge     gap + D.w <= 0,  gap = min over b of D.x - max over a of
+//     D.x axis k of b: likewise                         gap - D.w <= 0,  gap = min over a of D.x - max over b
+//     of D.x
+//
+// An own edge is its own support, so one projection per axis does (book section 7.7.2, one-sided form).
+// Normals are not normalised: no sign and no ratio of gap and speed needs it.
+//
+// Where a - b is flat or has a corner sharper than 60 degrees, edge normals alone do not bound it well: two
+// collinear segments have no edge normal along them, and beyond the tip of a needle all gaps are far smaller
+// than the distance. So every vertex that turns by more than 120 degrees adds an axis that points outward
+// along its bisector, a "tip". A convex polygon has at most two of them; the ends of a segment are tips. With
+// tips the largest gap/|D| is at least half the distance: a corner of a - b below 60 degrees is made of two
+// corners that are, and the normals of the edges at it and the bisector are at most 90 degrees apart; at
+// other corners the normals are at most 120 degrees apart.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "geom/polygon.hpp"
+#include "geom/two_fold.hpp"
+#include "geom/vec.hpp"
+
+namespace geomsrv {
+
+/// Error of a gap, relative to |D|_1 times the reach of the pair, in units of kRoundoff: edge, local
+/// coordinate, product and sum make 4 for each of the two projections, their difference 2 (it is at most 2
+/// |D|_1 reach); the rest covers second-order terms and the rounding of the bound.
+inline constexpr double kGapError = 12.0;
+
+/// Added for large polygons, whose supports are found by walking: an edge whose height is misjudged because
+/// it is within 5 units of level is worth 5 |D|_1 of its length, and all edges together are at most 8 reaches
+/// long.
+inline constexpr double kWalkError = 40.0;
+
+/// Error of a speed D.w relative to |Dx wx| + |Dy wy|, in units of kRoundoff: edge, velocity, product, sum.
+inline constexpr double kSpeedError = 5.0;
+
+/// Error of a gap or speed in double-double, relative to the same sum over its terms, in units of
+/// kTwoFoldRoundoff: differences are exact, products make 7 and their sum 3; the rest covers the bound.
+inline constexpr double kTwoFoldDotError = 12.0;
+
+/// Below 2^-1022 results are rounded to multiples of 2^-1074; no bound here counts more than 16 of them.
+inline constexpr double kPairUnderflow = 0x1p-1070;
+
+/// One polygon of a pair, as arrays of at least `axes` rounded up to a whole number of lanes.
+struct PairedPolygon {
+    Ring ring;              ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
+    std::size_t edges = 0;  ///< 0 for a point, 2 for a segment
+    std::size_t axes = 0;   ///< edges, then tips
+    std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis
+    double* x = nullptr;               ///< vertices relative to the origin of the pair, times its scale
+    double* y = nullptr;
+    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`
+    double* dy = nullptr;
+    double* own = nullptr;          ///< own support along the axis
+    double* gap = nullptr;          ///< support of the other polygon minus own
+    std::array<double*, 2> work{};  ///< for the query, one number per axis
+
+    /// First of the vertices on which the axis rests: an edge's, or the tip.
+    [[nodiscard]] std::size_t base(std::size_t axis) const { return axis < edges ? axis : tip[axis - edges]; }
+    [[nodiscard]] std::size_t next(std::size_t vertex) const {
+        return vertex + 1 < ring.size() ? vertex + 1 : 0;
+    }
+    [[nodiscard]] std::size_t previous(std::size_t vertex) const {
+        return (vertex > 0 ? vertex : ring.size()) - 1;
+    }
+    [[nodiscard]] Vec2 axis(std::size_t k) const { return {dx[k], dy[k]}; }
+    [[nodiscard]] Vec2 local(std::size_t vertex) const { return {x[vertex], y[vertex]}; }
+};
+
+struct TwoFoldVec2 {
+    TwoFold x, y;
+};
+
+/// A double-double number and how far the exact one may be from it.
+struct Enclosed {
+    TwoFold value;
+    double error = 0.0;
+};
+
+/// Vertices of a ring one after another, counter-clockwise.
+struct Chain {
+    std::size_t first = 0;
+    std::size_t last = 0;
+};
+
+/// An axis of one of the two polygons.
+struct AxisOf {
+    int side = 0;  ///< 0: of a, 1: of b
+    std::size_t index = 0;
+};
+
+/// Height along an axis D up to which a vertex counts as level with the extreme one, beyond what rounding can
+/// do: min(noise (|D|_1 + |e|_1), limit |D|_1) for a chain of edges of length |e|_1.
+struct Slack {
+    double noise = 0.0;
+    double limit = 0.0;
+};
+
+/// dot(a, b) in double-double.
+Enclosed enclosed_dot(TwoFoldVec2 a, TwoFoldVec2 b);
+
+class PolygonPair {
+public:
+    /// Scratch memory for rings of at most so many vertices.
+    PolygonPair(std::size_t largest_a, std::size_t largest_b);
+
+    /// Takes up two valid rings; they must outlive the next call.
+    void load(Ring a, Ring b);
+
+    [[nodiscard]] const PairedPolygon& side(int i) const { return sides_[static_cast<std::size_t>(i)]; }
+    [[nodiscard]] const PairedPolygon& other(int i) const { return sides_[static_cast<std::size_t>(1 - i)]; }
+
+    /// Largest |local coordinate|, scaled.
+    [[nodiscard]] double reach() const { return reach_; }
+    /// Largest |coordinate| as given, scaled; may be infinite.
+    [[nodiscard]] double magnitude() const { return magnitude_; }
+    /// Lengths of the pair are the given ones times 2^scale_exponent; it is 0 unless the reach is extreme.
+    [[nodiscard]] int scale_exponent() const { return scale_exponent_; }
+    /// Error of `gap` relative to |D|_1; add kPairUnderflow.
+    [[nodiscard]] double gap_error() const { return gap_error_; }
+
+    /// The exact difference of two given points, times the scale.
+    [[nodiscard]] TwoFoldVec2 difference(Vec2 to, Vec2 from) const;
+
+    /// Vertices of the other polygon that are lowest along an axis, up to `slack`.  Heights are summed over
+    /// edges, which are relatively exact, so nearly parallel edges of polygons far apart are told from
+    /// parallel ones.
+    [[nodiscard]] Chain lowest(AxisOf axis, Slack slack) const;
+    /// Vertices of the axis' own polygon that are highest along it, up to `slack`; among them the axis' edge.
+    [[nodiscard]] Chain highest(AxisOf axis, Slack slack) const;
+
+    /// The axis with the largest gap/|D|, edges before tips: the one to part (or keep apart) the polygons
+    /// along.
+    [[nodiscard]] AxisOf widest_gap() const;
+
+    /// The axis itself: exact for edges, and for tips by definition.
+    [[nodiscard]] TwoFoldVec2 exact_axis(AxisOf axis) const;
+    /// Gap along an axis in double-double, and its exact sign.
+    [[nodiscard]] Enclosed enclosed_gap(AxisOf axis) const;
+    [[nodiscard]] int sign_of_gap(AxisOf axis) const;
+
+private:
+    bool place(Ring a, Ring b, bool known_strict);
+    bool place_axes(PairedPolygon& p, bool known_strict);
+    void project();
+
+    std::array<PairedPolygon, 2> sides_;
+    std::vector<double> storage_;
+    std::array<StrictHull, 2> hulls_;
+    double reach_ = 0.0;
+    double magnitude_ = 0.0;
+    double gap_error_ = 0.0;
+    double before_ = 1.0;     // factor of coordinates, so that their differences do not overflow
+    double scale_ = 1.0;      // factor of differences
+    int scale_exponent_ = 0;  // of both factors together
+};
+
+}  // namespace geomsrv
