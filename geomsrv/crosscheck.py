@@ -44,11 +44,14 @@ from geomsrv.answers import Distances, DistanceStatus
 from geomsrv.errors import GeometryError
 
 if TYPE_CHECKING:
+    from geomsrv.pairwise import ListedDistances
     from geomsrv.scene import PairDistances, Scene
+    from geomsrv.world import World
 
 __all__ = ["CrossCheck", "Difference", "KindTally", "Mode", "SkipReason", "Tally", "cross_check_scene"]
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 # Pairs judged at a time; FCL takes some 10 ms for them, and the counters are that fresh.
 BATCH_PAIRS = 256
@@ -137,6 +140,7 @@ class CrossCheck:
         self._recent = {explained: deque[Difference](maxlen=MAX_RECENT) for explained in (True, False)}
         self._closing = False
         self._thread: threading.Thread | None = None
+        self._retired = False  # the thread has ended, or is past looking at the queue
 
         # The thread's own.
         self._solids: WeakKeyDictionary[AnyShape, Solid] = WeakKeyDictionary()
@@ -200,32 +204,82 @@ class CrossCheck:
         for name, given in (("shapes", pairs), ("answers", answers.distance), ("labels", names)):
             if len(given) != count:
                 raise GeometryError(f"{name} must have one item per row of poses_ab, got {len(given)} and {count}")
-        chosen = self._choose(count)
-        rows = Rows(
-            shapes=[pairs[i] for i in chosen],
-            labels=[names[i] for i in chosen],
-            poses=poses[chosen],
-            distance=answers.distance[chosen],
-            lower=answers.lower[chosen],
-            upper=answers.upper[chosen],
-            point_a=answers.point_a[chosen],
-            point_b=answers.point_b[chosen],
-            normal=answers.normal[chosen],
-            unsupported=answers.status[chosen] == DistanceStatus.UNSUPPORTED,
-            far=np.zeros(len(chosen)),
+        chosen = self._admit(pairs)
+        self._enqueue(
+            Rows(
+                shapes=[pairs[i] for i in chosen],
+                labels=[names[i] for i in chosen],
+                poses=poses[chosen],
+                distance=answers.distance[chosen],
+                lower=answers.lower[chosen],
+                upper=answers.upper[chosen],
+                point_a=answers.point_a[chosen],
+                point_b=answers.point_b[chosen],
+                normal=answers.normal[chosen],
+                unsupported=answers.status[chosen] == DistanceStatus.UNSUPPORTED,
+                far=np.zeros(len(chosen)),
+            )
         )
-        return self._enqueue(rows, count - len(chosen))
+        return len(chosen)
 
-    def submit_scene(self, scene: Scene, pairs: PairDistances) -> int:
+    def submit_pairs(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> int:
+        """Queue what was answered about pairs of a scene's version; returns at once.
+
+        Parameters
+        ----------
+        world : World
+        pairs : (n, 2) int64
+            Rows of `world`.
+        answer : PairDistances or ListedDistances
+            n rows, in the fixed frame; ``want=("penetration",)`` tells a deep overlap from a touch.
+
+        Returns
+        -------
+        int
+            How many pairs were queued; in mode "off" always 0.
+        """
+        if self.mode == Mode.OFF:
+            return 0
+        table = [world.table.shapes[k] for k in world.shape.tolist()]
+        shapes = [(table[i], table[j]) for i, j in pairs.tolist()]
+        chosen = self._admit(shapes)
+        if not chosen:
+            return 0
+        a, b = pairs[chosen, 0], pairs[chosen, 1]
+        rotation, origin = world.rotations[a], world.poses[a, :3]
+
+        def local(vectors: FloatArray) -> FloatArray:
+            turned: FloatArray = np.einsum("nji,nj->ni", rotation, vectors)
+            return turned
+
+        step = local(world.poses[b, :3] - origin)
+        self._enqueue(
+            Rows(
+                shapes=[shapes[i] for i in chosen],
+                labels=[f"{world.ids[i]} / {world.ids[j]}" for i, j in pairs[chosen].tolist()],
+                poses=np.hstack([step, _relative_rotations(world.poses[a, 3:], world.poses[b, 3:])]),
+                distance=answer.distance[chosen],
+                lower=answer.lower[chosen],
+                upper=answer.upper[chosen],
+                point_a=local(answer.point_a[chosen] - origin),
+                point_b=local(answer.point_b[chosen] - origin),
+                normal=local(answer.normal[chosen]),
+                unsupported=answer.status[chosen] == DistanceStatus.UNSUPPORTED,
+                far=np.linalg.norm(origin, axis=1) + np.linalg.norm(world.poses[b, :3], axis=1),
+            )
+        )
+        return len(chosen)
+
+    def submit_scene(self, scene: Scene, answer: PairDistances) -> int:
         """Queue what `Scene.distances` answered; returns at once.
 
-        Call it before the scene changes: the shapes and poses are read from `scene`, and if it has moved on,
-        the pairs are counted as skipped.
+        Call it before the scene changes: if it has, its poses are not those of the answer any more, and the pairs are
+        counted as skipped.
 
         Parameters
         ----------
         scene : Scene
-        pairs : PairDistances
+        answer : PairDistances
             Of this scene; ``want=("penetration",)`` tells a deep overlap from a touch.
 
         Returns
@@ -235,42 +289,15 @@ class CrossCheck:
         """
         if self.mode == Mode.OFF:
             return 0
-        chosen = self._choose(len(pairs))
-        names = [(pairs.ids_a[i], pairs.ids_b[i]) for i in chosen]
-        objects = {}
-        for name in {name for pair in names for name in pair}:
-            if name in scene:
-                objects[name] = scene[name]
-        if scene.version != pairs.version:
+        world = scene.world
+        if world.version != answer.version:
             with self._changed:
-                self._offered += len(pairs)
-                self._not_sampled += len(pairs) - len(chosen)
-                self._of_kind("unknown").skipped += len(chosen)
-                self._reasons[SkipReason.STALE] += len(chosen)
+                self._offered += len(answer)
+                self._of_kind("unknown").skipped += len(answer)
+                self._reasons[SkipReason.STALE] += len(answer)
             return 0
-        sides = [[objects[pair[k]] for pair in names] for k in (0, 1)]
-        poses_a, poses_b = (np.array([side.pose for side in objects], np.float64).reshape(-1, 7) for objects in sides)
-        rotation = _validate.rotation_matrices(poses_a[:, 3:])
-        origin = poses_a[:, :3]
-
-        def local(vectors: FloatArray) -> FloatArray:
-            turned: FloatArray = np.einsum("nji,nj->ni", rotation, vectors)
-            return turned
-
-        rows = Rows(
-            shapes=[(a.shape, b.shape) for a, b in zip(*sides, strict=True)],
-            labels=[f"{a} / {b}" for a, b in names],
-            poses=np.hstack([local(poses_b[:, :3] - origin), _relative_rotation(poses_a[:, 3:], poses_b[:, 3:])]),
-            distance=pairs.distance[chosen],
-            lower=pairs.lower[chosen],
-            upper=pairs.upper[chosen],
-            point_a=local(pairs.point_a[chosen] - origin),
-            point_b=local(pairs.point_b[chosen] - origin),
-            normal=local(pairs.normal[chosen]),
-            unsupported=np.zeros(len(chosen), dtype=bool),
-            far=np.linalg.norm(origin, axis=1) + np.linalg.norm(poses_b[:, :3], axis=1),
-        )
-        return self._enqueue(rows, len(pairs) - len(chosen))
+        rows = [(world.index[a], world.index[b]) for a, b in zip(answer.ids_a, answer.ids_b, strict=True)]
+        return self.submit_pairs(world, np.array(rows, np.int64).reshape(-1, 2), answer)
 
     def poll(self) -> list[Difference]:
         """Differences found since the last call, the last `MAX_UNPOLLED` of them; never waits."""
@@ -324,38 +351,49 @@ class CrossCheck:
 
     # --------------------------------------------------------------------------------------- taking pairs in
 
-    def _choose(self, count: int) -> list[int]:
-        """Rows to take, ascending."""
-        if self.mode == Mode.ALL:
-            return list(range(count))
+    def _admit(self, shapes: list[tuple[AnyShape, AnyShape]]) -> list[int]:
+        """Count what is offered and pick, in ascending order, what is to be queued."""
         with self._changed:
-            taken: list[int] = np.flatnonzero(self._random.random(count) < self._fraction).tolist()
+            self._offered += len(shapes)
+            chosen = np.arange(len(shapes))
+            if self.mode == Mode.SAMPLE:
+                chosen = np.flatnonzero(self._random.random(len(shapes)) < self._fraction)
+                self._not_sampled += len(shapes) - len(chosen)
+            left = chosen[:0]
+            if self._closing:
+                chosen, left, reason = left, chosen, SkipReason.CLOSED
+            elif not self.available:
+                chosen, left, reason = left, chosen, SkipReason.UNAVAILABLE
+            elif len(chosen) > (room := max(0, self._queue_limit - self._pending)):
+                # At random: otherwise the last pairs of a large scene would never be looked at.
+                order = self._random.permutation(chosen)
+                chosen, left, reason = np.sort(order[:room]), order[room:], SkipReason.DROPPED
+            if len(left):
+                self._skip([shapes[i] for i in left.tolist()], reason)
+            self._pending += len(chosen)
+            taken: list[int] = chosen.tolist()
         return taken
 
-    def _enqueue(self, rows: Rows, left_out: int) -> int:
-        """Count all that was offered, and queue what there is room for."""
+    def _enqueue(self, rows: Rows) -> None:
+        """Queue rows that have been admitted."""
         with self._changed:
-            self._offered += left_out + len(rows)
-            self._not_sampled += left_out
-            if self._closing or not self.available:
-                self._skip(rows.shapes, SkipReason.CLOSED if self._closing else SkipReason.UNAVAILABLE)
-                return 0
-            room = max(0, self._queue_limit - self._pending)
-            if len(rows) > room:
-                # At random: otherwise the last rows of a large scene would never be looked at.
-                order = self._random.permutation(len(rows)).tolist()
-                self._skip([rows.shapes[i] for i in order[room:]], SkipReason.DROPPED)
-                rows = rows.take(sorted(order[:room]))
-            self._pending += len(rows)
             for start in range(0, len(rows), BATCH_PAIRS):
                 self._queue.append(rows.take(range(start, min(start + BATCH_PAIRS, len(rows)))))
-            if self._thread is None and len(rows):
+            if self._retired or (self._closing and self._thread is None):
+                # `close`, or a fault, came between admitting them and now.
+                self._give_up()
+            elif self._thread is None and self._queue:
                 self._thread = threading.Thread(
                     target=self._run, args=(self._fcl,), name="geomsrv cross-check", daemon=True
                 )
                 self._thread.start()
             self._changed.notify_all()
-        return len(rows)
+
+    def _give_up(self) -> None:
+        """Skip all that is queued, since nobody will judge it; the lock is held."""
+        while self._queue:
+            self._skip(self._queue[0].shapes, SkipReason.CLOSED if self._closing else SkipReason.UNAVAILABLE)
+            self._done(self._queue[0])
 
     def _skip(self, shapes: Sequence[tuple[AnyShape, AnyShape]], reason: SkipReason) -> None:
         """Count pairs that get no verdict; the lock is held."""
@@ -383,10 +421,8 @@ class CrossCheck:
         finally:
             fcl.close()
             with self._changed:
-                left = SkipReason.CLOSED if self._closing else SkipReason.UNAVAILABLE
-                while self._queue:
-                    self._skip(self._queue[0].shapes, left)
-                    self._done(self._queue[0])
+                self._retired = True
+                self._give_up()
 
     def _next(self) -> Rows | None:
         """The batch at the head of the queue, where it stays until it is done; None when closing."""
@@ -557,7 +593,7 @@ class _Findings:
             self.skipped.setdefault(reason, []).extend(rows.shapes[i] for i in np.flatnonzero(which))
 
 
-def _relative_rotation(a: FloatArray, b: FloatArray) -> FloatArray:
+def _relative_rotations(a: FloatArray, b: FloatArray) -> FloatArray:
     """Quaternions (n, 4) x y z w of b as seen from a: conj(a) * b."""
     va, wa, vb, wb = a[:, :3], a[:, 3:], b[:, :3], b[:, 3:]
     vector = wa * vb - wb * va - np.cross(va, vb)

@@ -758,6 +758,19 @@ def test_a_scene_is_checked_pair_by_pair(rng):
     assert set(tally.kinds) == set(_judge.PEERS) and all(kind.agreed for kind in tally.kinds.values())
 
 
+@pytest.mark.parametrize("started", [True, False])
+def test_pairs_that_were_being_submitted_while_it_closed_are_counted_too(started, rng, monkeypatch):
+    check = CrossCheck("all")
+    if started:
+        check.submit(*spheres(10, rng))
+        assert check.drain(30.0)
+    enqueue = check._enqueue
+    monkeypatch.setattr(check, "_enqueue", lambda rows: (check.close(), enqueue(rows)))
+    check.submit(*spheres(300, rng))
+    assert check.tally().reasons == {SkipReason.CLOSED: 300} and adds_up(check.tally())
+    assert check.tally().pending == 0 and check.worker_pid is None
+
+
 def test_a_scene_that_has_moved_on_is_not_compared(rng):
     scene = crowd(rng, 4)
     pairs = scene.distances(np.inf)
