@@ -23,6 +23,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "geom/exact_sign.hpp"
 #include "geom/two_fold.hpp"
@@ -337,9 +338,9 @@ struct ContactMarks {
 
 /// Contact at `moment` along an axis: the faces that meet there are known from it.
 ///
-///      own face, at rest on the axis   first >------------------> last        ^ along
-///      face of the other polygon              last <------------------< first
-///                                             low           high
+///      face of the other polygon          |------------------------|
+///      own face                  |---------------------|                  ---> along
+///                                        low          high
 ///
 /// A face is an edge with its collinear neighbours, or a vertex.  The ends of the common part are always
 /// vertices, of one polygon or of the other.
@@ -352,12 +353,15 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
     const auto mark = [&](int side, std::size_t vertex) -> Mark {
         return {side, vertex, dot(along, pair.side(side).local(vertex)) + (side == 1 ? moment * drift : 0.0)};
     };
-    const Chain face = pair.highest(axis, slacks.heights());
-    const Chain opposite = pair.lowest(axis, slacks.heights());
-    const Mark own_low = mark(axis.side, face.first);
-    const Mark own_high = mark(axis.side, face.last);
-    const Mark other_low = mark(1 - axis.side, opposite.last);
-    const Mark other_high = mark(1 - axis.side, opposite.first);
+    // Ends in order along the line: the two edges of a segment lie on each other, so its chain may run either
+    // way.
+    const auto ends = [&](int side, Chain chain) {
+        const Mark first = mark(side, chain.first);
+        const Mark last = mark(side, chain.last);
+        return first.place <= last.place ? std::pair{first, last} : std::pair{last, first};
+    };
+    const auto [own_low, own_high] = ends(axis.side, pair.highest(axis, slacks.heights()));
+    const auto [other_low, other_high] = ends(1 - axis.side, pair.lowest(axis, slacks.heights()));
     const Mark low = own_low.place < other_low.place ? other_low : own_low;
     const Mark high = other_high.place < own_high.place ? other_high : own_high;
 

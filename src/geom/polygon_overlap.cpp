@@ -9,10 +9,25 @@ namespace geomsrv {
 
 namespace {
 
-/// p + t (q - p), also where the difference overflows.
-Vec2 between(Vec2 p, Vec2 q, double t) {
-    const Vec2 way = q - p;
-    return std::isfinite(way.x) && std::isfinite(way.y) ? p + t * way : (1.0 - t) * p + t * q;
+/// Where an edge of one polygon crosses an edge line of the other, to about the last place: both are needed
+/// in double-double, because the ends of the edges may be far from the crossing.
+Vec2 crossing(const PolygonPair& pair, int side, std::size_t vertex, AxisOf axis) {
+    const PairedPolygon& p = pair.side(side);
+    const Vec2 from = p.ring[vertex];
+    const Vec2 to = p.ring[p.next(vertex)];
+    const Vec2 base = pair.side(axis.side).ring[pair.side(axis.side).base(axis.index)];
+    const TwoFoldVec2 normal = pair.exact_axis(axis);
+    const TwoFold t = enclosed_dot(normal, pair.difference(base, from)).value /
+                      enclosed_dot(normal, pair.difference(to, from)).value;
+    const auto at = [&t](double start, double end) {
+        const TwoFold way = two_difference(end, start);
+        // A difference beyond the largest double: the crossing lies between the ends all the same.
+        if (!std::isfinite(way.hi)) {
+            return (1.0 - t.hi) * start + t.hi * end;
+        }
+        return (TwoFold{start, 0.0} + t * way).hi;
+    };
+    return {at(from.x, to.x), at(from.y, to.y)};
 }
 
 /// Height of v over the line through p and q, or its distance from p if they are closer than `tolerance`.
@@ -30,12 +45,18 @@ double height(Vec2 p, Vec2 q, Vec2 v, double tolerance) {
 void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack slack) {
     const PairedPolygon& p = pair.side(side);
     const PairedPolygon& q = pair.other(side);
+    // A point has no axes to be inside of; the pass for the other side tells whether it is part of this one.
+    if (q.axes == 0) {
+        return;
+    }
     // A segment is one edge, not two; a point an edge of no length.
     const std::size_t edges = std::max<std::size_t>(p.edges == 2 ? 1 : p.edges, 1);
     for (std::size_t i = 0; i < edges; ++i) {
         const std::size_t end = p.next(i);
         double enter = 0.0;
         double leave = 1.0;
+        std::size_t enter_axis = 0;
+        std::size_t leave_axis = 0;
         for (std::size_t k = 0; k < q.axes && enter <= leave; ++k) {
             const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
             const double level = pair.gap_error() * size + kPairUnderflow +
@@ -44,10 +65,12 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             const double to = dot(q.axis(k), p.local(end)) - q.own[k];
             if (from > level && to > level) {
                 leave = -1.0;
-            } else if (from > level) {
-                enter = std::max(enter, from / (from - to));
-            } else if (to > level) {
-                leave = std::min(leave, from / (from - to));
+            } else if (from > level && from / (from - to) > enter) {
+                enter = from / (from - to);
+                enter_axis = k;
+            } else if (to > level && from / (from - to) < leave) {
+                leave = from / (from - to);
+                leave_axis = k;
             }
         }
         if (enter > leave) {
@@ -58,10 +81,10 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             found_.push_back(p.ring[i]);
         }
         if (enter > 0.0) {
-            found_.push_back(between(p.ring[i], p.ring[end], enter));
+            found_.push_back(crossing(pair, side, i, {1 - side, enter_axis}));
         }
         if (leave < 1.0) {
-            found_.push_back(between(p.ring[i], p.ring[end], leave));
+            found_.push_back(crossing(pair, side, i, {1 - side, leave_axis}));
         }
         if (leave == 1.0 && p.edges == 2) {
             found_.push_back(p.ring[end]);

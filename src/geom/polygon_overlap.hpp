@@ -14,10 +14,10 @@ namespace geomsrv {
 
 class PolygonOverlap {
 public:
-    /// Vertices of a's and b's intersection, given coordinates: strictly convex and counter-clockwise, or the
-    /// two ends of a segment, or one point; none if there is nothing within `tolerance(axis)` of both.
-    /// Vertices closer than `length` to each other or to the line through their neighbours are merged.  Valid
-    /// until the next call.
+    /// Vertices of the intersection, in given coordinates: strictly convex and counter-clockwise, or the two
+    /// ends of a segment, or one point; none if the polygons are apart by more than the slack.  Vertices
+    /// within the slack of each other, or of the line through their neighbours, are merged.  Valid until the
+    /// next call.
     std::span<const Vec2> of(const PolygonPair& pair, Slack slack);
 
 private:
