@@ -82,9 +82,7 @@ CONSTANTS = {
 def public(module: Any) -> dict[str, Any]:
     """What `import geomsrv` shows: everything without an underscore that is not a module."""
     return {
-        name: value
-        for name, value in vars(module).items()
-        if not name.startswith("_") and not inspect.ismodule(value)
+        name: value for name, value in vars(module).items() if not name.startswith("_") and not inspect.ismodule(value)
     }
 
 
@@ -95,14 +93,10 @@ def callables() -> Iterator[tuple[str, Any]]:
             continue
         yield name, value
         if inspect.isclass(value):
-            for member in {
-                m for base in value.__mro__ if base.__module__.startswith("geomsrv") for m in vars(base)
-            }:
+            for member in {m for base in value.__mro__ if base.__module__.startswith("geomsrv") for m in vars(base)}:
                 found = inspect.getattr_static(value, member)
                 if not member.startswith("_") and (
-                    isinstance(found, (property, classmethod))
-                    or inspect.isroutine(found)
-                    or hasattr(found, "func")
+                    isinstance(found, (property, classmethod)) or inspect.isroutine(found) or hasattr(found, "func")
                 ):
                     yield f"{name}.{member}", getattr(found, "func", None) or getattr(value, member)
 
@@ -130,9 +124,7 @@ def test_answers_have_their_fields(answer: str) -> None:
     kind = getattr(gs, answer)
     fields = {field.name for field in dataclasses.fields(kind)}
     for name in ATTRIBUTES[answer].split():
-        assert name in fields or isinstance(
-            inspect.getattr_static(kind, name), (property, cached_property)
-        ), name
+        assert name in fields or isinstance(inspect.getattr_static(kind, name), (property, cached_property)), name
 
 
 def test_constants() -> None:
@@ -240,9 +232,7 @@ def compiled_functions() -> dict[str, list[tuple[str, str]]]:
         readable = re.sub(r"ndarray\[dtype=(\w+)[^\]]*\]", r"\1", signature)
         definition = ast.parse(f"{readable}: ...").body[0]
         assert isinstance(definition, ast.FunctionDef)
-        functions[name] = [
-            (a.arg, ast.unparse(a.annotation or ast.Constant(None))) for a in definition.args.args
-        ]
+        functions[name] = [(a.arg, ast.unparse(a.annotation or ast.Constant(None))) for a in definition.args.args]
     return functions
 
 
@@ -258,9 +248,7 @@ def test_stub_agrees_with_the_engine() -> None:
 def array_arguments(signature: str) -> list[np.ndarray]:
     """An array of the dtype and number of axes that each array parameter asks for."""
     found = re.findall(r"ndarray\[dtype=(\w+), shape=\(([^)]*)\)", signature)
-    shapes = [
-        [4 if size == "*" else int(size) for size in shape.replace(" ", "").split(",")] for _, shape in found
-    ]
+    shapes = [[4 if size == "*" else int(size) for size in shape.replace(" ", "").split(",")] for _, shape in found]
     return [np.zeros(shape, dtype) for (dtype, _), shape in zip(found, shapes, strict=True)]
 
 
@@ -269,9 +257,7 @@ def test_engine_refuses_what_it_would_have_to_copy(name: str) -> None:
     """Another dtype or layout means that the edge was bypassed: a TypeError, never a silent copy."""
     function = getattr(_core, name)
     arrays = array_arguments(function.__nb_signature__[0][0])
-    rest = [
-        0.0 if kind == "float" else True for _, kind in stub_functions()[name] if kind in ("float", "bool")
-    ]
+    rest = [0.0 if kind == "float" else True for _, kind in stub_functions()[name] if kind in ("float", "bool")]
     assert len(arrays) + len(rest) == len(stub_functions()[name])
     for i, array in enumerate(arrays):
         others = [array.astype(np.float32), np.repeat(array, 2, axis=0)[::2]]

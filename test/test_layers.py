@@ -15,7 +15,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-ROS = ("rclpy", "*_msgs", "std_srvs", "builtin_interfaces", "geomsrv.msg", "geomsrv.srv", "tf2_ros", "tf2_py")
+ROS = (
+    "rclpy",
+    "*_msgs",
+    "std_srvs",
+    "builtin_interfaces",
+    "rcl_interfaces",
+    "geomsrv.msg",
+    "geomsrv.srv",
+    "tf2_ros",
+    "tf2_py",
+)
 
 # Top to bottom.  A file belongs to the layer that names it, and `geomsrv/*.py` takes the rest.  It may import
 # from its own layer and the ones below, from the standard library, and from the packages in the last column.
@@ -99,9 +109,7 @@ def python_violations(path: str, source: str, files: frozenset[str]) -> list[str
     found = []
     for line, name in imported(ast.parse(source), package):
         top = name.partition(".")[0]
-        if any(
-            name == pattern or fnmatch(top, pattern) or name.startswith(f"{pattern}.") for pattern in allowed
-        ):
+        if any(name == pattern or fnmatch(top, pattern) or name.startswith(f"{pattern}.") for pattern in allowed):
             continue
         if name != "*" and top in sys.stdlib_module_names:
             continue
@@ -140,9 +148,7 @@ CPP_FILES = sources("src/**/*.[ch]pp")
 def test_python_imports_point_down() -> None:
     assert {"geomsrv/queries.py", "geomsrv/shapes.py", "geomsrv/__init__.py"} <= PYTHON_FILES
     found = [
-        v
-        for path in sorted(PYTHON_FILES)
-        for v in python_violations(path, (ROOT / path).read_text(), PYTHON_FILES)
+        v for path in sorted(PYTHON_FILES) for v in python_violations(path, (ROOT / path).read_text(), PYTHON_FILES)
     ]
     assert not found, "\n".join(found)
 
@@ -255,6 +261,4 @@ def test_checker_finds_an_include_violation(path: str, line: str) -> None:
 
 def test_checker_accepts_includes_that_point_down() -> None:
     assert include_violations("src/geom/a.cpp", '#include <cmath>\n#include "geom/vec.hpp"\n') == []
-    assert (
-        include_violations("src/bind/a.cpp", '#include <nanobind/ndarray.h>\n#include "geom/vec.hpp"\n') == []
-    )
+    assert include_violations("src/bind/a.cpp", '#include <nanobind/ndarray.h>\n#include "geom/vec.hpp"\n') == []

@@ -282,9 +282,7 @@ def test_first_contact_by_hand(
 
 def test_first_contact_of_the_book_example() -> None:
     """The printed contact set is the point (5, 1); the bodies share a segment."""
-    found = polygon.first_contact(
-        [(3, 0), (0, 2), (2, 0)], (2, 1), [(-2, -2), (2, -1), (1, -1)], (3, 2), math.inf
-    )
+    found = polygon.first_contact([(3, 0), (0, 2), (2, 0)], (2, 1), [(-2, -2), (2, -1), (1, -1)], (3, 2), math.inf)
     assert (found.time, sorted(found.contact)) == (1, [(4, 1), (5, 1)])
 
 

@@ -111,9 +111,7 @@ class Separation:
 
     @property
     def relation(self) -> str:
-        return (
-            "disjoint" if self.signed_square > 0 else "overlapping" if self.signed_square < 0 else "touching"
-        )
+        return "disjoint" if self.signed_square > 0 else "overlapping" if self.signed_square < 0 else "touching"
 
 
 def separation(p: Sequence[Vector], q: Sequence[Vector]) -> Separation:
@@ -150,9 +148,7 @@ class FirstContact:
     last_time: Fraction | None
     parts: bool  #: False if the contact lasts for ever (t_max infinite, no relative motion)
     contact: Ring  #: the intersection at `time`
-    normal_speed_sq: (
-        Fraction | None
-    )  #: squared closing speed of the constraint that closes last; None at time 0
+    normal_speed_sq: Fraction | None  #: squared closing speed of the constraint that closes last; None at time 0
     separation_sq: Fraction  #: at t = 0
 
     @property
@@ -171,9 +167,7 @@ def first_contact(p: Any, velocity_p: Any, q: Any, velocity_q: Any, t_max: Any) 
         return FirstContact(NEVER, None, None, True, [], None, start.signed_square)
     first, last = span
     last = end if last is None else last if end is None else min(last, end)
-    contact = intersection(
-        [add(x, scale(first, v_p)) for x in hull(p)], [add(x, scale(first, v_q)) for x in hull(q)]
-    )
+    contact = intersection([add(x, scale(first, v_p)) for x in hull(p)], [add(x, scale(first, v_q)) for x in hull(q)])
     if first > 0:
         status = WILL_TOUCH
     else:

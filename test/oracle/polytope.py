@@ -84,9 +84,7 @@ def hull(points: Sequence[Vector]) -> Hull:
         for a, b in edges:
             if (b, a) not in edges:
                 insert(a, b, i)
-    return Hull(
-        3, tuple((normal, Fraction(offset, factor)) for normal, offset in dict.fromkeys(facets.values()))
-    )
+    return Hull(3, tuple((normal, Fraction(offset, factor)) for normal, offset in dict.fromkeys(facets.values())))
 
 
 def _independent(points: Sequence[Vector]) -> list[Vector]:
@@ -121,9 +119,7 @@ class Separation:
 
     @property
     def relation(self) -> str:
-        return (
-            "disjoint" if self.signed_square > 0 else "overlapping" if self.signed_square < 0 else "touching"
-        )
+        return "disjoint" if self.signed_square > 0 else "overlapping" if self.signed_square < 0 else "touching"
 
 
 def nearest(a: Sequence[Vector], b: Sequence[Vector]) -> tuple[Vector, Vector]:
@@ -183,9 +179,7 @@ def _affine_least_norm(points: Sequence[Vector]) -> tuple[list[int], int] | None
         return None
     right = [-dot(x, base) for x in arms]
     weights = [
-        _determinant(
-            [[right[i] if j == column else gram[i][j] for j in range(len(arms))] for i in range(len(arms))]
-        )
+        _determinant([[right[i] if j == column else gram[i][j] for j in range(len(arms))] for i in range(len(arms))])
         for column in range(len(arms))
     ]
     return [total - sum(weights), *weights], total

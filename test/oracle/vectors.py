@@ -66,10 +66,7 @@ def primitive(n: Vector) -> Vector:
 def to_integers(*groups: Sequence[Vector]) -> tuple[int, list[list[Vector]]]:
     """A common factor, and every vector of every group times that factor in ints."""
     factor = math.lcm(1, *(x.denominator for group in groups for vector in group for x in vector))
-    scaled = [
-        [tuple(x.numerator * (factor // x.denominator) for x in vector) for vector in group]
-        for group in groups
-    ]
+    scaled = [[tuple(x.numerator * (factor // x.denominator) for x in vector) for vector in group] for group in groups]
     return factor, scaled
 
 
