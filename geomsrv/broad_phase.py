@@ -118,6 +118,10 @@ def boxes_swept(world: World, horizon: float) -> Aabbs:
         reach = world.table.reach[world.shape[turning]] + world.uncertainty[turning]
         margin = (reach * (1.0 + AABB_ROUNDING))[:, None] + AABB_ROUNDING * np.abs(position)
         lower[turning], upper[turning] = position - margin, position + margin
+    drift = world.velocity_uncertainty
+    if drift.any():
+        grow = np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)[:, None]
+        lower, upper = np.nextafter(lower - grow, -np.inf), np.nextafter(upper + grow, np.inf)
     moving = np.flatnonzero(world.moves)
     if len(moving):
         speed = world.twists[moving, :3]

@@ -35,6 +35,10 @@ RELATIVE_POSE_ROUNDING = 96.0 * ROUNDOFF
 MAX_APPROACH_STEPS = 64
 
 
+NO_DISTANCE = "distance {} is unsupported in this version"
+NO_ROTATION = "first contact of a polygon with angular velocity is unsupported"
+NO_MOTION = "first contact of moving solids ({}) is unsupported"
+
 _NO_PAIRS = np.zeros((0, 2), np.int64)
 
 
@@ -53,8 +57,11 @@ class _Rows:
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
-        """All rows, sorted by pair."""
-        whole = cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls._columns()))
+        """All rows, sorted by pair; each part is sorted, and one may be empty."""
+        filled = [part for part in parts if len(part.pairs)]
+        if len(filled) < 2:
+            return filled[0] if filled else parts[0]
+        whole = cls(*(np.concatenate([getattr(part, name) for part in filled]) for name in cls._columns()))
         return whole.take(np.lexsort(whole.pairs.T[::-1]))
 
 
@@ -144,11 +151,13 @@ def distance_rows(
             count_kinds(world, part, counts)
             parts.append(kernel(world, part, penetration))
     rows = DistanceRows.joined(parts)
-    # A kernel may decline a pair for other reasons than its kinds, such as two half spaces.
+    missing = [Unsupported.of_kinds(world, solids[~answered], NO_DISTANCE)]
+    # A kernel may decline a pair for other reasons than its kinds.
     declined = rows.status == DistanceStatus.UNSUPPORTED
-    missing = np.concatenate([solids[~answered], rows.pairs[declined]])
-    unsupported = Unsupported.of_kinds(world, missing, "distance {} is unsupported in this version")
-    return rows.take(~declined), Unsupported.joined([unsupported])
+    if declined.any():
+        missing.append(Unsupported.of_kinds(world, rows.pairs[declined], NO_DISTANCE))
+        rows = rows.take(~declined)
+    return rows, Unsupported.joined(missing)
 
 
 def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
@@ -194,7 +203,7 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
 def _pose_rounding(world: World, pairs: IntArray, poses_ab: FloatArray) -> FloatArray:
     """(k,) how much the distance of a pair may have changed because its relative pose is rounded [m]."""
     i, j = pairs[:, 0], pairs[:, 1]
-    arm = _arm(world, i, j, np.linalg.norm(poses_ab[:, :3], axis=1))
+    arm = _arm(world, i, j, np.abs(poses_ab[:, :3]).sum(axis=1))
     turned = ~(world.unrotated[i] & world.unrotated[j])
     rounding = np.where(turned, RELATIVE_POSE_ROUNDING * arm, 0.0)
     return rounding + _lost(world.poses[j, :3], world.poses[i, :3])
@@ -282,6 +291,9 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, counts: Cou
     """Polygons in translation."""
     rows = _polygon_contacts(world, pairs, world.twists[:, :2], horizon)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
+    # A velocity that is off displaces by no more than this until the end of the time looked at.
+    drift = world.velocity_uncertainty[pairs].sum(axis=1)
+    uncertainty += np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)
     if not uncertainty.any():
         return rows.take(rows.status != ContactStatus.NEVER)
     never = rows.status == ContactStatus.NEVER
@@ -398,7 +410,11 @@ def _spinning_polygons(world: World, pairs: IntArray) -> tuple[ContactRows, Unsu
     rows.last_time[:] = np.nan
     certain = -_distance_at(world, pairs, np.zeros(len(pairs)), True)[2] >= world.uncertainty[pairs].sum(axis=1)
     rows.upper[~apart & ~certain] = np.inf
-    reason = np.full(int(apart.sum()), "first contact of a polygon with angular velocity is unsupported", dtype=object)
+    reason = np.full(int(apart.sum()), NO_ROTATION, dtype=object)
+    if world.motion_faults:
+        for k, pair in enumerate(pairs[apart].tolist()):
+            faults = [world.motion_faults[row] for row in pair if row in world.motion_faults]
+            reason[k] = f"first contact is unsupported: {faults[0]}" if faults else reason[k]
     return rows, Unsupported(pairs[apart], reason)
 
 
@@ -408,7 +424,8 @@ def _solid_contacts(
     """Solids: in contact now, at rest relative to each other and so never, or unsupported."""
     rows, missing = distance_rows(world, pairs, True, counts)
     motion = world.twists[rows.pairs]
-    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~motion[:, :, 3:].any(axis=(1, 2))
+    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[rows.pairs].any(axis=1)
+    resting &= ~world.velocity_uncertainty[rows.pairs].any(axis=1)
     touching, may_touch = rows.distance <= 0.0, rows.lower <= 0.0
     status = np.select(
         [rows.distance < 0.0, touching, ~resting, rows.status == DistanceStatus.NOT_CONVERGED],
@@ -439,7 +456,7 @@ def _solid_contacts(
     unsupported = Unsupported.joined(
         [
             missing,
-            Unsupported.of_kinds(world, rows.pairs[moving], "first contact of moving solids ({}) is unsupported"),
+            Unsupported.of_kinds(world, rows.pairs[moving], NO_MOTION),
         ]
     )
     return ContactRows.joined([answered.take(known | moving), ContactRows.silent(missing.pairs)]), unsupported

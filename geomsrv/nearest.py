@@ -8,7 +8,7 @@ from collections import Counter
 
 import numpy as np
 
-from geomsrv.answers import FloatArray, IntArray
+from geomsrv.answers import IntArray
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, candidates, gaps
 from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows
 from geomsrv.world import World, supported_kinds
@@ -57,12 +57,12 @@ def nearest_rows(
 
 
 def _size(boxes: Aabbs) -> float:
-    """Diameter of what the finite boxes fill; inf if there is none, or nothing but one point."""
+    """At least the diameter of what the finite boxes fill; inf if there is none, or nothing but one point."""
     finite = np.isfinite(boxes.lower).all(axis=1) & np.isfinite(boxes.upper).all(axis=1)
     if not finite.any():
         return np.inf
     span = boxes.upper[finite].max(axis=0) - boxes.lower[finite].min(axis=0)
-    return float(np.linalg.norm(span)) or np.inf
+    return float(span.sum()) or np.inf  # no less than the diagonal, and it does not overflow
 
 
 def _any_kernel(world: World) -> bool:
@@ -94,6 +94,9 @@ def _best_of(
     return best, unsupported.take(nearer)
 
 
-def _limit(best: DistanceRows) -> FloatArray | float:
+def _limit(best: DistanceRows) -> float:
     """Largest squared gap at which a pair may still be nearer."""
-    return max(float(best.distance[0]) * BEYOND, 0.0) ** 2 if len(best.pairs) else np.inf
+    if not len(best.pairs):
+        return np.inf
+    limit = max(float(best.distance[0]) * BEYOND, 0.0)
+    return limit * limit

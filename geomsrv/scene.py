@@ -61,6 +61,11 @@ class SceneObject:
     uncertainty : float
         Radius [m] >= 0 by which each vertex may be off, e.g. because it came as float32.  Widens the interval
         of every answer the object has part in.
+    velocity_uncertainty : float
+        Radius [m/s] >= 0 by which the linear velocity may be off.  Widens the intervals of first contacts.
+    motion_fault : str
+        Why `twist` does not tell how the object moves; empty if it does.  First contacts answer UNSUPPORTED
+        with this text, but for what it is in contact with now.
     """
 
     id: str
@@ -69,6 +74,8 @@ class SceneObject:
     twist: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     frame: str = ""
     uncertainty: float = 0.0
+    velocity_uncertainty: float = 0.0
+    motion_fault: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +301,7 @@ class Scene:
 
     @property
     def world(self) -> World:
-        """This version as arrays, a row per object; never changes."""
+        """The current version as arrays, a row per object; it never changes."""
         with self._lock:
             if self._outdated:
                 self._world = self._rebuilt()
@@ -341,6 +348,8 @@ class Scene:
             pose=world.poses[row].copy(),
             twist=world.twists[row].copy(),
             uncertainty=float(world.uncertainty[row]),
+            velocity_uncertainty=float(world.velocity_uncertainty[row]),
+            motion_fault=world.motion_faults.get(row, ""),
         )
 
     # ------------------------------------------------------------------------------------------------ changes
@@ -630,6 +639,8 @@ class Scene:
             table=old.table if same else ShapeTable.of(shapes),
             shape=shape,
             uncertainty=np.array([o.uncertainty for o in objects], dtype=np.float64),
+            velocity_uncertainty=np.array([o.velocity_uncertainty for o in objects], dtype=np.float64),
+            motion_faults={k: o.motion_fault for k, o in enumerate(objects) if o.motion_fault},
             poses=poses,
             twists=twists,
             allowed=np.array(sorted(keys), dtype=np.int64),
@@ -657,20 +668,30 @@ class Scene:
         items = list(good.values())
         poses, wrong_pose = numbers([item.pose for item in items], "pose", IDENTITY)
         twists, wrong_twist = numbers([item.twist for item in items], "twist", np.zeros(6))
-        radii, wrong_radius = numbers([[item.uncertainty] for item in items], "uncertainty", np.zeros(1))
+        bounds = [[item.uncertainty, item.velocity_uncertainty] for item in items]
+        radii, wrong_radius = numbers(bounds, "uncertainty and velocity_uncertainty", np.zeros(2))
         poses, unlike_pose = settled(poses, twists)
         frames = [item.frame if isinstance(item.frame, str) else "" for item in items]
         poses, twists, unknown_frame = in_fixed_frame(poses, twists, frames, self.fixed_frame, self._transforms)
         planar = np.array([isinstance(item.shape, Polygon) for item in items], dtype=bool)
         poses, unlike_plane = laid_flat(poses, twists, planar)
-        bad_radii = np.flatnonzero(~((radii[:, 0] >= 0.0) & (radii[:, 0] < np.inf))).tolist()
-        negative = {k: f"uncertainty must be finite and >= 0, got {radii[k, 0]}" for k in bad_radii}
+        negative = {
+            k: f"{('uncertainty', 'velocity_uncertainty')[column]} must be finite and >= 0, got {radii[k, column]}"
+            for k, column in np.argwhere(~((radii >= 0.0) & (radii < np.inf))).tolist()
+        }
         # The first fault of an object in this order: later ones may only follow from it.
         found = unlike_plane | unknown_frame | unlike_pose | negative | wrong_radius | wrong_twist | wrong_pose
         for k, text in sorted(found.items()):
             _blame(faults, items[k].id, text)
         return {
-            item.id: replace(item, pose=poses[k], twist=twists[k], frame="", uncertainty=float(radii[k, 0]))
+            item.id: replace(
+                item,
+                pose=poses[k],
+                twist=twists[k],
+                frame="",
+                uncertainty=float(radii[k, 0]),
+                velocity_uncertainty=float(radii[k, 1]),
+            )
             for k, item in enumerate(items)
         }
 

@@ -49,7 +49,9 @@ def _first_contacts(world: World) -> list[str]:
         lines.append(f"- followed in translation: {_count(followed, 'polygon')}")
     turning = int(world.turns[polygons].sum())
     if turning:
-        lines.append(f"- unsupported unless in contact now: {_count(turning, 'polygon')} with angular velocity")
+        lines.append(
+            f"- unsupported unless in contact now: {_count(turning, 'polygon')} that turn or move unpredictably"
+        )
     if moving[solids].any():
         lines.append(
             f"- unsupported unless in contact now: {_count(int(moving[solids].sum()), 'moving solid')}, "

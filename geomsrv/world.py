@@ -161,7 +161,10 @@ class World:
     table : ShapeTable
     shape : (n,) int64
         Row of the table of each object.
-    uncertainty : (n,) float64
+    uncertainty, velocity_uncertainty : (n,) float64
+        [m], [m/s]
+    motion_faults : mapping of int to str
+        Rows of the objects whose twist does not tell how they move, and why.
     poses, twists : (n, 7), (n, 6) float64
     allowed : (p,) int64
         Sorted keys ``i * n + j``, i < j, of the present pairs that are ignored.
@@ -174,6 +177,8 @@ class World:
     table: ShapeTable
     shape: IntArray
     uncertainty: FloatArray
+    velocity_uncertainty: FloatArray
+    motion_faults: Mapping[int, str]
     poses: FloatArray
     twists: FloatArray
     allowed: IntArray
@@ -185,7 +190,8 @@ class World:
         """Nothing yet."""
         rows = np.zeros(0, np.int64)
         nothing = np.zeros(0)
-        return cls((), {}, ShapeTable.of(()), rows, nothing, np.zeros((0, 7)), np.zeros((0, 6)), rows, 0, None)
+        poses, twists = np.zeros((0, 7)), np.zeros((0, 6))
+        return cls((), {}, ShapeTable.of(()), rows, nothing, nothing, {}, poses, twists, rows, 0, None)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -222,8 +228,10 @@ class World:
 
     @cached_property
     def turns(self) -> BoolArray:
-        """(n,) bool: has an angular velocity."""
-        return self.twists[:, 3:].any(axis=1)
+        """(n,) bool: does not translate: has an angular velocity, or moves in a way that is not known."""
+        turns = self.twists[:, 3:].any(axis=1)
+        turns[list(self.motion_faults)] = True
+        return turns
 
     @cached_property
     def rings(self) -> tuple[FloatArray, IntArray]:
