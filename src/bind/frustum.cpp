@@ -1,16 +1,20 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/frustum_box.hpp"
+#include "geom/point_frustum.hpp"
 
 namespace geomsrv::bind {
 
 namespace {
 
 using PackedFrustum = Input<double, nb::shape<18>>;
+using PackedFrustum2D = Input<double, nb::shape<10>>;
 
 Frustum unpack(const double* p) {
     return {.origin = {p[0], p[1], p[2]},
@@ -26,11 +30,22 @@ Frustum unpack(const double* p) {
 struct BoxRows {
     const double *center, *axes, *half_extents;
 
+    Vec3 center_of(std::size_t i) const { return {center[3 * i], center[3 * i + 1], center[3 * i + 2]}; }
+    Vec3 half_extents_of(std::size_t i) const {
+        return {half_extents[3 * i], half_extents[3 * i + 1], half_extents[3 * i + 2]};
+    }
     OrientedBox operator[](std::size_t i) const {
-        const double *c = center + 3 * i, *a = axes + 9 * i, *e = half_extents + 3 * i;
-        return {{c[0], c[1], c[2]},
+        const double* const a = axes + 9 * i;
+        return {center_of(i),
                 {{{a[0], a[1], a[2]}, {a[3], a[4], a[5]}, {a[6], a[7], a[8]}}},
-                {e[0], e[1], e[2]}};
+                half_extents_of(i)};
+    }
+};
+
+struct Points3 {
+    Lanes at[3];
+    GEOMSRV_INLINE explicit Points3(const double* p) {
+        for (int k = 0; k < 3; ++k) at[k] = Lanes(Lanes::Vector{p[k], p[k + 3], p[k + 6], p[k + 9]});
     }
 };
 
@@ -38,7 +53,7 @@ struct CullCounts {
     std::int64_t bound = 0, filter = 0, uncertain = 0;
 };
 
-/// Boxes are classified by planes, and the undecided ones of each block go on to the axes while still in cache.
+/// Block by block, so that what one stage leaves is still in cache for the next.
 GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFrame& frame, BoxRows boxes,
                                         std::size_t count, std::uint8_t* state, bool* certain) {
     constexpr std::size_t kBlock = 256;
@@ -47,9 +62,21 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
     for (std::size_t begin = 0; begin < count; begin += kBlock) {
         const std::size_t end = std::min(begin + kBlock, count);
         std::size_t left = 0;
-        for (std::size_t i = begin; i < end; ++i) {
+        std::size_t first = begin;
+        for (; first + Lanes::kCount <= end; first += Lanes::kCount) {
+            const Lanes found = classify_by_sphere(planes, Points3(boxes.center + 3 * first).at, Points3(boxes.half_extents + 3 * first).at);
+            store_bytes(found, state + first);
+            for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
+                undecided[left] = first + lane;
+                left += found[static_cast<int>(lane)] == kUndecided ? 1 : 0;
+            }
+        }
+        for (std::size_t i = first; i < end; ++i) undecided[left++] = i;
+        std::fill(certain + begin, certain + end, true);
+        const std::size_t after_spheres = std::exchange(left, 0);
+        for (std::size_t k = 0; k < after_spheres; ++k) {
+            const std::size_t i = undecided[k];
             state[i] = classify_by_planes(planes, boxes[i]);
-            certain[i] = true;
             undecided[left] = i;
             left += state[i] == kUndecided ? 1 : 0;
         }
@@ -63,6 +90,126 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
         }
     }
     return counts;
+}
+
+// ------------------------------------------------------------------------------------------------------- points
+
+template <int Sides>
+View<Sides> unpack_view(const double* p) {
+    constexpr int kDimension = Sides + 1;
+    View<Sides> view;
+    std::copy_n(p, kDimension, view.origin);
+    p += kDimension;
+    for (auto& row : view.axes.row) {
+        std::copy_n(p, kDimension, row);
+        p += kDimension;
+    }
+    for (int i = 0; i < Sides; ++i) {
+        view.low[i] = *p++;
+        view.high[i] = *p++;
+    }
+    view.near = p[0];
+    view.far = p[1];
+    return view;
+}
+
+/// Where answers go; `nearest` is null if it was not asked for.
+struct PointAnswers {
+    double *distance, *lower, *upper;
+    std::uint8_t* region;
+    double* nearest;
+
+    template <int Sides>
+    void put(std::size_t i, const PointDistance<Sides>& answer) const {
+        distance[i] = answer.distance;
+        lower[i] = answer.lower;
+        upper[i] = answer.upper;
+        region[i] = answer.region;
+        if (nearest != nullptr) std::copy_n(answer.nearest, Sides + 1, nearest + (Sides + 1) * i);
+    }
+};
+
+/// Groups of four points; a group in which some number is out of range is done again, one by one.
+template <class Kinds, bool Skewed, int Sides>
+GEOMSRV_WIDE_CLONES void measure_points(const DistanceFrame<Lanes, Sides>& frame, const View<Sides>& view,
+                                        const double* points, std::size_t count, PointAnswers out) {
+    constexpr int kDimension = Sides + 1;
+    std::optional<DistanceFrame<long double, Sides>> wide;
+    for (std::size_t i = 0; i + Lanes::kCount <= count; i += Lanes::kCount) {
+        const double* const p = points + kDimension * i;
+        Lanes point[kDimension];
+        for (int k = 0; k < kDimension; ++k) {
+            point[k] = Lanes(Lanes::Vector{p[k], p[k + kDimension], p[k + 2 * kDimension], p[k + 3 * kDimension]});
+        }
+        const auto found = distance_to_frustum<Kinds, Skewed>(frame, point);
+        found.distance.store(out.distance + i);
+        found.lower.store(out.lower + i);
+        found.upper.store(out.upper + i);
+        store_bytes(found.region, out.region + i);
+        if (out.nearest != nullptr) {
+            const auto nearest = nearest_in_world(frame, point, found);
+            for (int lane = 0; lane < Lanes::kCount; ++lane) {
+                for (int k = 0; k < kDimension; ++k) {
+                    out.nearest[kDimension * (i + static_cast<std::size_t>(lane)) + static_cast<std::size_t>(k)] = nearest.at[k][lane];
+                }
+            }
+        }
+        if (!all(found.in_range)) [[unlikely]] {
+            if (!wide) wide = distance_frame<long double>(view);
+            for (std::size_t k = i; k < i + Lanes::kCount; ++k) {
+                out.put(k, distance_in_long_double(*wide, points + kDimension * k));
+            }
+        }
+    }
+}
+
+template <int Sides>
+void measure_all(const View<Sides>& view, const double* points, std::size_t count, PointAnswers out) {
+    constexpr std::size_t kDimension = Sides + 1;
+    if (!is_ordinary(view)) {
+        const auto frame = distance_frame<long double>(view);
+        for (std::size_t i = 0; i < count; ++i) out.put(i, distance_in_long_double(frame, points + kDimension * i));
+        return;
+    }
+    const auto frame = distance_frame<Lanes>(view);
+    const auto measure = [&](const double* rows, std::size_t size, PointAnswers answers) {
+        with_windows(frame, [&](auto kinds) {
+            using Kinds = decltype(kinds);
+            (frame.refinements > 0 ? measure_points<Kinds, true, Sides> : measure_points<Kinds, false, Sides>)(
+                frame, view, rows, size, answers);
+        });
+    };
+    const std::size_t whole = count - count % Lanes::kCount;
+    measure(points, whole, out);
+    if (whole < count) {
+        // The last few points fill a group by repetition.
+        double padded[Lanes::kCount * kDimension], values[3][Lanes::kCount], nearest[Lanes::kCount * kDimension];
+        std::uint8_t region[Lanes::kCount];
+        for (std::size_t k = 0; k < Lanes::kCount; ++k) {
+            std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension, padded + kDimension * k);
+        }
+        measure(padded, Lanes::kCount, {values[0], values[1], values[2], region, nearest});
+        for (std::size_t k = 0; whole + k < count; ++k) {
+            PointDistance<Sides> answer{values[0][k], values[1][k], values[2][k], region[k], {}};
+            std::copy_n(nearest + kDimension * k, kDimension, answer.nearest);
+            out.put(whole + k, answer);
+        }
+    }
+}
+
+template <int Sides, class Packed, class Points>
+nb::object distance_to_frustum_batch(const Packed& packed, const Points& points, bool witness) {
+    const std::size_t count = points.shape(0);
+    auto distance = empty<double>({count}), lower = empty<double>({count}), upper = empty<double>({count});
+    auto region = empty<std::uint8_t>({count});
+    Output<double> nearest{nb::none()};
+    if (witness) nearest = empty<double>({count, std::size_t{Sides + 1}});
+    {
+        const nb::gil_scoped_release unlocked;
+        measure_all(unpack_view<Sides>(packed.data()), points.data(), count,
+                    {distance.data, lower.data, upper.data, region.data, nearest.data});
+    }
+    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array);
 }
 
 }  // namespace
@@ -86,6 +233,10 @@ void define_frustum(nb::module_& m) {
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
         nb::arg("half_extents").noconvert());
+    m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>, nb::arg("frustum").noconvert(),
+          nb::arg("points").noconvert(), nb::arg("witness"));
+    m.def("distance_to_frustum_2d", distance_to_frustum_batch<1, PackedFrustum2D, Rows2>,
+          nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
 }
 
 }  // namespace geomsrv::bind

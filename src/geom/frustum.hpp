@@ -10,18 +10,11 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
+#include "geom/lanes.hpp"
 #include "geom/vec.hpp"
-
-// One binary serves every x86-64: the loop is compiled twice and the loader picks the wider one where the processor has
-// it.  Both give the same bits, because contraction is off and a fused multiply-add is only used where std::fma says so.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
-#else
-#define GEOMSRV_WIDE_CLONES
-#endif
-/// A function that must melt into its caller, to be compiled for the caller's instruction set.
-#define GEOMSRV_INLINE [[gnu::always_inline]] inline
 
 namespace geomsrv {
 
@@ -36,6 +29,14 @@ struct Frustum {
     double near = 1.0, far = 2.0;   ///< depths along D [m], 0 < near < far
 };
 
+/// step(0), ..., step(Count - 1) with constant arguments: a loop around this one can become vector code.
+template <std::size_t Count, class Step>
+GEOMSRV_INLINE void unrolled(Step step) {
+    [&]<std::size_t... Index>(std::index_sequence<Index...>) __attribute__((always_inline)) {
+        (step(std::integral_constant<int, Index>{}), ...);
+    }(std::make_index_sequence<Count>{});
+}
+
 /// a b - c d with at most 2 units of roundoff, whatever cancels (Kahan; Jeannerod, Louvet, Muller 2013, theorem 3.1).
 template <class Real>
 GEOMSRV_INLINE Real difference_of_products(Real a, Real b, Real c, Real d) {
@@ -44,26 +45,42 @@ GEOMSRV_INLINE Real difference_of_products(Real a, Real b, Real c, Real d) {
     return std::fma(a, b, -cd) + error;
 }
 
-/// Dual basis of (L, U, D): row i has scalar product 1 with axis i and 0 with the others, so row i times X - E is the
-/// i-th frustum coordinate even where the axes are not quite orthonormal.  For orthonormal axes it is `axes` itself.
+/// Rows of a small square matrix.
+template <class Real, int Size>
+struct Rows {
+    Real row[Size][Size];
+};
+
+/// Dual basis of the axes: row i has scalar product 1 with axis i and 0 with the others, so row i times X - E is the i-th
+/// frustum coordinate even where the axes are not quite orthonormal.  For orthonormal axes it is the axes themselves.
 ///
 /// Each entry has a relative error of at most kDualError: 2u from the minor, 5.4u from the determinant (products and
 /// sums of the three minors, which have Cauchy-Schwarz sum of magnitudes <= 1.05 det), u from the division.
 inline constexpr double kDualError = 9.0 * kUnitRoundoff;
 
-inline Mat3 dual_basis(const Mat3& axes) {
-    const auto minor = [](Vec3 a, Vec3 b) -> Vec3 {
-        return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
-                difference_of_products(a.x, b.y, a.y, b.x)};
-    };
-    const auto [left, up, view] = axes.row;
-    const Vec3 rows[3] = {minor(up, view), minor(view, left), minor(left, up)};
-    const double det = dot(left, rows[0]);
-    Mat3 dual;
+template <class Real>
+Rows<Real, 3> dual_basis(const Rows<double, 3>& axes) {
+    Rows<Real, 3> dual;
     for (int i = 0; i < 3; ++i) {
-        dual.row[i] = {rows[i].x / det, rows[i].y / det, rows[i].z / det};
+        const double* const a = axes.row[(i + 1) % 3];
+        const double* const b = axes.row[(i + 2) % 3];
+        for (int k = 0; k < 3; ++k) {
+            const int y = (k + 1) % 3, z = (k + 2) % 3;
+            dual.row[i][k] = difference_of_products<Real>(a[y], b[z], a[z], b[y]);
+        }
+    }
+    const Real det = axes.row[0][0] * dual.row[0][0] + axes.row[0][1] * dual.row[0][1] + axes.row[0][2] * dual.row[0][2];
+    for (auto& row : dual.row) {
+        for (Real& entry : row) entry /= det;
     }
     return dual;
+}
+
+template <class Real>
+Rows<Real, 2> dual_basis(const Rows<double, 2>& axes) {
+    const auto& [left, view] = axes.row;
+    const Real det = difference_of_products<Real>(left[0], view[1], left[1], view[0]);
+    return {{{view[1] / det, -view[0] / det}, {-left[1] / det, left[0] / det}}};
 }
 
 }  // namespace geomsrv

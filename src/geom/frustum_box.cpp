@@ -31,9 +31,9 @@ double largest(Vec3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::f
 
 Vec3 magnitudes(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
 
-// ------------------------------------------------------------------------------------------------- stage 1 bounds
+// ------------------------------------------------------------------------------------------------- plane bounds
 
-// u = unit roundoff.  Rounding errors of stage 1, as multiples of u times the sum of the magnitudes of the terms:
+// u = unit roundoff.  Rounding errors of the planes, as multiples of u times the sum of the magnitudes of the terms:
 //   entries of a normal        9 (dual basis) + 2 (p * row + r * row)                                   11
 //   s = normal . (C - E)       11 + 1 (C - E) + 1 (product) + 2 (sums) + 1 (minus offset)               16
 //   r = sum e_i |normal . A_i| 11 + 1 (product) + 2 (sums) + 1 (times e) + 2 (sums)                     17
@@ -42,13 +42,16 @@ Vec3 magnitudes(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)
 // largest entry of the normal, cancellation not counted; `reach` has 2 for 1.75.  18 <= 20; 18 * 1.75 <= 20 * 2.
 constexpr double kPlaneError = 20.0 * kUnitRoundoff;
 
+// A unit axis of a box may be off by 1e-2 in each product of rows, so sum e_i |n . A_i| <= |n| |e| sqrt(1.03).
+constexpr double kMaxStretch = 1.02;
+
 // The subtraction of the offset and the final s +- r round once each, relative to the offset too.
 constexpr double kOffsetError = 2.0 * kUnitRoundoff;
 
 // About 30 products per plane may underflow, each losing at most 2^-1075; normals are about 1.
 constexpr double kUnderflow = 0x1p-1060;
 
-// ------------------------------------------------------------------------------------------------- stage 2 bounds
+// ------------------------------------------------------------------------------------------------- axes bounds
 
 // Coordinates (a, b, d) are scaled, each by its own power of two: culling is affine invariant, and a needle or a very
 // wide window becomes an ordinary one.  A window thinner than 2^-450 near stays thin: then each product of one a, one b
@@ -134,12 +137,27 @@ struct PlaneTally {
     }
 };
 
+Mat3 to_frustum(const Mat3& axes) {
+    Rows<double, 3> rows;
+    for (int i = 0; i < 3; ++i) {
+        rows.row[i][0] = axes.row[i].x;
+        rows.row[i][1] = axes.row[i].y;
+        rows.row[i][2] = axes.row[i].z;
+    }
+    const Rows<double, 3> dual = dual_basis<double>(rows);
+    Mat3 map;
+    for (int i = 0; i < 3; ++i) {
+        map.row[i] = {dual.row[i][0], dual.row[i][1], dual.row[i][2]};
+    }
+    return map;
+}
+
 }  // namespace
 
 CullPlanes cull_planes(const Frustum& frustum) {
-    const Mat3 dual = dual_basis(frustum.axes);
+    const Mat3 dual = to_frustum(frustum.axes);
     const auto [left, up, view] = dual.row;
-    CullPlanes planes{};
+    CullPlanes planes;
     planes.origin = frustum.origin;
     int count = 0;
     // Normal p * row + r * view, offset.
@@ -148,13 +166,13 @@ CullPlanes cull_planes(const Frustum& frustum) {
         const double scaled_p = unit * p, scaled_r = unit * r;
         const Vec3 n = scaled_p * row + scaled_r * view;
         const Vec3 terms = std::fabs(scaled_p) * magnitudes(row) + std::fabs(scaled_r) * magnitudes(view);
-        planes.normal_x[count] = n.x;
-        planes.normal_y[count] = n.y;
-        planes.normal_z[count] = n.z;
-        planes.offset[count] = offset;
-        planes.error_per_length[count] = kPlaneError * largest(terms);
-        planes.error[count] = kOffsetError * std::fabs(offset) + kUnderflow;
-        ++count;
+        planes.each[count++] = {n.x,
+                                n.y,
+                                n.z,
+                                offset,
+                                kMaxStretch * norm(n),
+                                kPlaneError * largest(terms),
+                                kOffsetError * std::fabs(offset) + kUnderflow};
     };
     add(0.0, view, -1.0, -frustum.near);
     add(0.0, view, 1.0, frustum.far);
@@ -162,14 +180,20 @@ CullPlanes cull_planes(const Frustum& frustum) {
     add(-frustum.near, left, frustum.l0, 0.0);
     add(frustum.near, up, -frustum.u1, 0.0);
     add(-frustum.near, up, frustum.u0, 0.0);
-    while (count < CullPlanes::kLanes) {
-        add(0.0, view, -1.0, -frustum.near);
+    for (int k = 0; k < CullPlanes::kGroups * Lanes::kCount; ++k) {
+        const PlaneLanes& plane = planes.each[k % CullPlanes::kCount];
+        PlaneLanes& group = planes.group[k / Lanes::kCount];
+        for (Lanes PlaneLanes::* const field :
+             {&PlaneLanes::x, &PlaneLanes::y, &PlaneLanes::z, &PlaneLanes::offset, &PlaneLanes::length,
+              &PlaneLanes::error_per_length, &PlaneLanes::error}) {
+            (group.*field).v[k % Lanes::kCount] = (plane.*field)[0];
+        }
     }
     return planes;
 }
 
 CullFrame cull_frame(const Frustum& frustum) {
-    const Mat3 dual = dual_basis(frustum.axes);
+    const Mat3 dual = to_frustum(frustum.axes);
     const int depth = std::ilogb(frustum.near);
     const auto slope_exponent = [&](double low, double high) {
         return std::max(std::ilogb(std::max(std::fabs(low), std::fabs(high))) - depth, kMinSlopeExponent);

@@ -6,8 +6,8 @@
 // 2000), book section 11.12.1, with these changes: side normals use mu for the up direction (the text prints l); windows
 // may be off-centre; edge x edge axes are computed without cancellation; every verdict says whether it is proven.
 //
-// Two stages.  The planes of the frustum decide most boxes in a few nanoseconds, or say that they cannot.  All 26
-// separating axes decide the rest.
+// Three stages, each for what the one before could not decide: the six planes against the sphere around the box, the six
+// planes against the box, all 26 separating axes.
 #pragma once
 
 #include <bit>
@@ -37,65 +37,85 @@ struct CullVerdict {
     bool certain = false;  ///< exact arithmetic on the same numbers is proven to give the same state
 };
 
-// ------------------------------------------------------------------------------------------------ stage 1: planes
+// ------------------------------------------------------------------------------------------- stages 1 and 2: planes
 
-/// The six planes with outward normals; lanes 6 and 7 repeat the first.  A point x is outside plane k if
-/// normal_k . (x - origin) > offset_k.
+/// Planes with outward normals n: a point x is outside if n . (x - origin) > offset.
+struct PlaneLanes {
+    Lanes x, y, z;           ///< n
+    Lanes offset;            ///< [m]
+    Lanes length;            ///< |n|, rounded up, times the length that an axis of a box may have
+    Lanes error_per_length;  ///< rounding error of a signed distance per unit of reach
+    Lanes error;             ///< the part that does not depend on the box
+};
+
 struct CullPlanes {
-    static constexpr int kLanes = 8;
+    static constexpr int kCount = 6, kGroups = 2;
     Vec3 origin;
-    double normal_x[kLanes], normal_y[kLanes], normal_z[kLanes];
-    double offset[kLanes];
-    double error_per_length[kLanes];  ///< rounding error of a signed distance per unit of `reach`, see below
-    double error[kLanes];             ///< the part that does not depend on the box
+    PlaneLanes each[kCount];    ///< one plane in all lanes, against four boxes
+    PlaneLanes group[kGroups];  ///< four planes, against one box; the last two repeat the first
 };
 
 CullPlanes cull_planes(const Frustum& frustum);
 
-/// What the planes say: a CullState, or kUndecided.  Whatever they decide is certain.
+/// Not decided by this stage; otherwise the value of a CullState, and certain.
 inline constexpr std::uint8_t kUndecided = 3;
 
-/// Beyond this reach products of stage 1 might overflow; such boxes go to stage 2, which scales.
+/// Beyond this reach products might overflow; such boxes go to the last stage, which scales.
 inline constexpr double kMaxReach = 0x1p1000;
 
-/// For each plane s = signed distance of the centre and r = half width of the box along the normal:
-///
-///     outside     some s - r > 0      (the box lies beyond that plane)
-///     inside      all  s + r < 0
-///     intersects  all  s < 0 and some s + r > 0:  centre in the frustum, some corner out of it
-///
-/// with each comparison taken by more than the rounding error `error_per_length * reach + error`.
-///
-/// The comparisons are sign bits of differences, so the loop over planes has no branch and becomes vector code.
-GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes& planes, const OrientedBox& box) {
-    const Vec3 x = box.center - planes.origin;
-    const auto [a0, a1, a2] = box.axes.row;
-    const Vec3 e = box.half_extents;
-    const double reach = (std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z)) + 2.0 * (e.x + e.y + e.z);
-    std::uint64_t any_beyond = 0, all_within = ~std::uint64_t{0}, all_centre = ~std::uint64_t{0}, any_across = 0;
-    for (int k = 0; k < CullPlanes::kLanes; ++k) {
-        const double nx = planes.normal_x[k], ny = planes.normal_y[k], nz = planes.normal_z[k];
-        const double s = (nx * x.x + ny * x.y + nz * x.z) - planes.offset[k];
-        const double r = e.x * std::fabs(nx * a0.x + ny * a0.y + nz * a0.z) +
-                         e.y * std::fabs(nx * a1.x + ny * a1.y + nz * a1.z) +
-                         e.z * std::fabs(nx * a2.x + ny * a2.y + nz * a2.z);
-        const double error = planes.error_per_length[k] * reach + planes.error[k];
-        any_beyond |= std::bit_cast<std::uint64_t>(error - (s - r));
-        all_within &= std::bit_cast<std::uint64_t>((s + r) + error);
-        all_centre &= std::bit_cast<std::uint64_t>(s + error);
-        any_across |= std::bit_cast<std::uint64_t>(error - (s + r));
+/// Added to the square of a radius, so that a radius whose square underflows is not taken for 0.
+inline constexpr double kMinSquaredRadius = 0x1p-900;
+
+// For each plane let s be the signed distance of the centre and r the half width along the normal, of the box or of the
+// sphere around it, grown by the rounding error, `error_per_length * reach + error`.
+//
+//     outside     some s > r         (all of it lies beyond that plane)
+//     inside      all s < -r
+//     intersects  all s < 0 and some s > -r, each by more than the error:  centre inside, some corner outside
+
+/// Four boxes against all planes.  A sphere needs no axes, which are most of a box; it can tell `outside` (0.0) and `inside`
+/// (2.0), else the answer is kUndecided.
+GEOMSRV_INLINE Lanes classify_by_sphere(const CullPlanes& planes, const Lanes (&center)[3], const Lanes (&half)[3]) {
+    const Lanes x = center[0] - planes.origin.x, y = center[1] - planes.origin.y, z = center[2] - planes.origin.z;
+    const Lanes radius = square_root((half[0] * half[0] + half[1] * half[1]) + (half[2] * half[2] + kMinSquaredRadius));
+    // As for boxes below, 2 (e_0 + e_1 + e_2) <= 3.5 radius.
+    const Lanes reach = (magnitude(x) + magnitude(y) + magnitude(z)) + 4.0 * radius;
+    LaneMask within = reach < Lanes(kMaxReach);
+    LaneMask beyond = ~within;
+    for (const PlaneLanes& plane : planes.each) {
+        const Lanes s = (plane.x * x + plane.y * y + plane.z * z) - plane.offset;
+        const Lanes r = radius * plane.length + (plane.error_per_length * reach + plane.error);
+        beyond = beyond | (r < s);
+        within = within & (s < -r);
     }
-    constexpr int kSignBit = 63;
-    const bool beyond = (any_beyond >> kSignBit) != 0, within = (all_within >> kSignBit) != 0;
-    const bool crossing = ((all_centre & any_across) >> kSignBit) != 0;
-    const std::uint8_t found = beyond     ? std::uint8_t{0}
-                               : within   ? std::uint8_t{2}
-                               : crossing ? std::uint8_t{1}
-                                          : kUndecided;
-    return reach < kMaxReach ? found : kUndecided;
+    beyond = beyond & (reach < Lanes(kMaxReach));
+    return select(beyond, Lanes(0.0), select(within, Lanes(2.0), Lanes(kUndecided)));
 }
 
-// ----------------------------------------------------------------------------------------- stage 2: separating axes
+/// One box against four planes at a time.
+GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes& planes, const OrientedBox& box) {
+    const Vec3 x = box.center - planes.origin, e = box.half_extents;
+    const auto [a0, a1, a2] = box.axes.row;
+    const double reach = (std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z)) + 2.0 * (e.x + e.y + e.z);
+    LaneMask in_range = Lanes(reach) < Lanes(kMaxReach);
+    LaneMask beyond = ~in_range, within = in_range, centre = in_range, across = beyond;
+    for (const PlaneLanes& plane : planes.group) {
+        const auto along = [&](Vec3 v) __attribute__((always_inline)) {
+            return plane.x * v.x + plane.y * v.y + plane.z * v.z;
+        };
+        const Lanes s = along(x) - plane.offset;
+        const Lanes r = e.x * magnitude(along(a0)) + e.y * magnitude(along(a1)) + e.z * magnitude(along(a2));
+        const Lanes error = plane.error_per_length * reach + plane.error;
+        beyond = beyond | (error < s - r);
+        within = within & (s + r < -error);
+        centre = centre & (s < -error);
+        across = across | (error < s + r);
+    }
+    if (!(reach < kMaxReach)) return kUndecided;
+    return any(beyond) ? std::uint8_t{0} : all(within) ? std::uint8_t{2} : all(centre) && any(across) ? std::uint8_t{1} : kUndecided;
+}
+
+// ----------------------------------------------------------------------------------------- stage 3: separating axes
 
 /// A frustum in units that make its numbers about 1: the window is [-1, 1] or so, the near depth in [1, 2).
 struct CullFrame {

@@ -1,0 +1,111 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Four doubles at a time, so that one kernel written for a number also serves as vector code.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+// One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the processor
+// has it.  Both give the same bits, because contraction is off and a fused multiply-add is only where std::fma says so.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
+#else
+#define GEOMSRV_WIDE_CLONES
+#endif
+
+/// A function that must melt into its caller, to be compiled for the caller's instruction set.
+#define GEOMSRV_INLINE [[gnu::always_inline]] inline
+
+namespace geomsrv {
+
+/// Four doubles; operations are lane by lane and compile to whatever vectors the target has.
+struct Lanes {
+    static constexpr int kCount = 4;
+    using Vector = double __attribute__((vector_size(kCount * sizeof(double))));
+    Vector v;
+
+    /// As stored: a double's alignment is enough.
+    using Stored __attribute__((vector_size(kCount * sizeof(double)), aligned(alignof(double)), may_alias)) = double;
+
+    Lanes() = default;
+    // Written out: GCC moves the members of a defaulted copy through general registers.
+    GEOMSRV_INLINE Lanes(const Lanes& other) : v(other.v) {}
+    GEOMSRV_INLINE Lanes& operator=(const Lanes& other) {
+        v = other.v;
+        return *this;
+    }
+    ~Lanes() = default;
+    GEOMSRV_INLINE Lanes(double x) : v{x, x, x, x} {}                    // NOLINT: numbers are lanes
+    GEOMSRV_INLINE explicit Lanes(const Vector& x) : v(x) {}
+    GEOMSRV_INLINE double operator[](int i) const { return v[i]; }
+    GEOMSRV_INLINE void store(double* to) const { *reinterpret_cast<Stored*>(to) = v; }
+};
+
+/// Outcome of a comparison in each lane: all bits set or none.
+struct LaneMask {
+    using Vector = std::int64_t __attribute__((vector_size(Lanes::kCount * sizeof(std::int64_t))));
+    Vector v;
+    LaneMask() = default;
+    GEOMSRV_INLINE LaneMask(const LaneMask& other) : v(other.v) {}
+    GEOMSRV_INLINE LaneMask& operator=(const LaneMask& other) {
+        v = other.v;
+        return *this;
+    }
+    ~LaneMask() = default;
+    GEOMSRV_INLINE explicit LaneMask(const Vector& x) : v(x) {}
+};
+
+GEOMSRV_INLINE Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
+GEOMSRV_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
+GEOMSRV_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
+GEOMSRV_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+GEOMSRV_INLINE LaneMask operator<(const Lanes& a, const Lanes& b) { return LaneMask(a.v < b.v); }
+GEOMSRV_INLINE LaneMask operator<=(const Lanes& a, const Lanes& b) { return LaneMask(a.v <= b.v); }
+GEOMSRV_INLINE LaneMask operator&(const LaneMask& a, const LaneMask& b) { return LaneMask(a.v & b.v); }
+GEOMSRV_INLINE LaneMask operator~(const LaneMask& a) { return LaneMask(~a.v); }
+GEOMSRV_INLINE LaneMask operator|(const LaneMask& a, const LaneMask& b) { return LaneMask(a.v | b.v); }
+GEOMSRV_INLINE bool all(const LaneMask& a) { return ((a.v[0] & a.v[1]) & (a.v[2] & a.v[3])) != 0; }
+GEOMSRV_INLINE bool any(const LaneMask& a) { return ((a.v[0] | a.v[1]) | (a.v[2] | a.v[3])) != 0; }
+
+/// condition ? a : b, for a number and lane by lane.
+template <class Real>
+GEOMSRV_INLINE Real select(bool condition, Real a, Real b) {
+    return condition ? a : b;
+}
+GEOMSRV_INLINE Lanes select(const LaneMask& condition, const Lanes& a, const Lanes& b) {
+    return Lanes(condition.v ? a.v : b.v);
+}
+
+template <class Real>
+GEOMSRV_INLINE Real lesser(const Real& a, const Real& b) {
+    return select(a < b, a, b);
+}
+template <class Real>
+GEOMSRV_INLINE Real greater(const Real& a, const Real& b) {
+    return select(b < a, a, b);
+}
+
+/// Whole numbers 0 to 255, one byte each: as digits to base 256 of one number they need one conversion, not four.
+GEOMSRV_INLINE void store_bytes(const Lanes& x, std::uint8_t* to) {
+    static_assert(Lanes::kCount == 4 && std::endian::native == std::endian::little);
+    const Lanes digits = x * Lanes(Lanes::Vector{0x1p0, 0x1p8, 0x1p16, 0x1p24});
+    const auto packed = static_cast<std::uint32_t>(static_cast<std::int64_t>((digits[0] + digits[1]) + (digits[2] + digits[3])));
+    std::memcpy(to, &packed, sizeof packed);
+}
+
+GEOMSRV_INLINE double magnitude(double x) { return std::fabs(x); }
+GEOMSRV_INLINE long double magnitude(long double x) { return std::fabs(x); }
+GEOMSRV_INLINE Lanes magnitude(const Lanes& x) {
+    return Lanes(Lanes::Vector{std::fabs(x[0]), std::fabs(x[1]), std::fabs(x[2]), std::fabs(x[3])});
+}
+
+GEOMSRV_INLINE double square_root(double x) { return std::sqrt(x); }
+GEOMSRV_INLINE long double square_root(long double x) { return std::sqrt(x); }
+GEOMSRV_INLINE Lanes square_root(const Lanes& x) {
+    return Lanes(Lanes::Vector{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])});
+}
+
+}  // namespace geomsrv

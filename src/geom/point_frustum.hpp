@@ -1,0 +1,283 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Distance from a point to a view frustum, its nearest point and its region; in space and in the plane.
+//
+// Paper 1 (Eberly, "Distance from Point to Orthogonal Frustum", 2000) walks a decision tree of Voronoi regions; book
+// sections 6.3.3 and 10.4.3 repeat it.  Here the same regions come out of one closed form without branches.
+//
+//        far   +-----------------------------+       At depth t the frustum is the window low t <= x <= high t,
+//               \        .                  /        so the squared distance to that slice is
+//                \      . t                /
+//           -----------x------- P         /          (t - z)^2 + sum over sides of excess(x, [low t, high t])^2,
+//                  \                     /
+//            near   +-------------------+            convex in t.  Half its derivative is increasing and consists of
+//                         .                          straight pieces:
+//                         E
+//     psi(t) = t - z + sum over sides of  low max(low t - x, 0) - high max(x - high t, 0).
+//
+// For a slope k, the piece k (k t - x) is cut off at 0 from above where the window widens away from the axis (min(0, .)),
+// from below where it lies beyond the axis and moves towards the point (max(0, .), only the inner slope of an off-centre
+// window).  So psi = min over S max over T of (t - z + sum over slopes in S and T of k (k t - x)), with S and T subsets of
+// those slopes, and its root is
+//
+//     t* = max over S min over T of  (z + sum k x) / (1 + sum k^2).
+//
+// clamped to [near, far].  For windows around the axis there is no T.  No point is near both slopes of a side, so S and T
+// hold at most one slope of a side each.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "geom/frustum.hpp"
+
+namespace geomsrv {
+
+/// A frustum as its numbers: `Sides` is 2 in space (L, U), 1 in the plane (L); coordinate `Sides` is the depth along D.
+template <int Sides>
+struct View {
+    static constexpr int kDimension = Sides + 1;
+    double origin[kDimension];       ///< apex E [m]
+    Rows<double, kDimension> axes;   ///< rows L, (U,) D
+    double low[Sides], high[Sides];  ///< window on the near plane [m]
+    double near, far;                ///< [m]
+};
+
+/// Where the window of a side lies with respect to the axis, which is at x = 0.
+enum class Window : std::uint8_t {
+    centred,  ///< low = -high: |x| serves for x, with one slope
+    around,   ///< low <= 0 <= high
+    beyond,   ///< 0 < low; mirrored if need be
+};
+
+/// How many choices S has for a side (no slope, or one), and T.
+constexpr int min_choices(Window window) { return window == Window::around ? 3 : 2; }
+constexpr int max_choices(Window window) { return window == Window::beyond ? 2 : 1; }
+
+/// The windows of all sides, known at compile time.
+template <Window... Kind>
+struct Windows {
+    static constexpr Window kKind[] = {Kind...};
+    static constexpr int kMin = (min_choices(Kind) * ...), kMax = (max_choices(Kind) * ...);
+};
+
+/// A frustum prepared for distances.  `Number` is Lanes, with every lane the same, or long double where a product might
+/// leave the range of double.
+template <class Number, int Sides>
+struct DistanceFrame {
+    static constexpr int kDimension = Sides + 1;
+    static constexpr int kMaxRoots = Sides == 2 ? 16 : 4;
+    /// Candidate for the depth of the nearest point: depth * z + sum side[i] * x[i].
+    struct Root {
+        Number depth, side[Sides];
+    };
+
+    Number origin[kDimension];
+    Rows<Number, kDimension> axes;    ///< literal, but negated where the window was mirrored
+    Rows<Number, kDimension> dual;    ///< world to frustum coordinates
+    Rows<Number, kDimension> defect;  ///< Gram matrix of the axes minus the identity
+    Number low_slope[Sides], high_slope[Sides];
+    Number low[Sides], high[Sides], view;      ///< the same slopes as low / view, high / view, scaled to about 1
+    Number low_room[Sides], high_room[Sides];  ///< 1 / (|low| + view), 1 / (|high| + view)
+    Number near, far;
+    Root roots[kMaxRoots];
+    Number low_code[Sides], high_code[Sides];  ///< what being beyond low, high adds to the region
+    Number error_per_length, relative_error;   ///< of a distance
+    Window window[Sides];
+    int refinements = 0;  ///< projections needed after the first, see `distance_to_frustum`
+};
+
+template <class Number, int Sides>
+DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view);
+
+/// Whether products and ratios of these numbers are in the range of double.
+template <int Sides>
+bool is_ordinary(const View<Sides>& view);
+
+/// call(Windows<...>{}) for the windows of a frame.  Two centred windows are worth a kernel; one is not.
+template <class Number, class Call>
+auto with_windows(const DistanceFrame<Number, 1>& frame, Call call) {
+    switch (frame.window[0]) {
+        case Window::centred: return call(Windows<Window::centred>{});
+        case Window::around: return call(Windows<Window::around>{});
+        default: return call(Windows<Window::beyond>{});
+    }
+}
+template <class Number, class Call>
+auto with_windows(const DistanceFrame<Number, 2>& frame, Call call) {
+    const bool beyond0 = frame.window[0] == Window::beyond, beyond1 = frame.window[1] == Window::beyond;
+    if (beyond0 && beyond1) return call(Windows<Window::beyond, Window::beyond>{});
+    if (beyond0) return call(Windows<Window::beyond, Window::around>{});
+    if (beyond1) return call(Windows<Window::around, Window::beyond>{});
+    if (frame.window[0] == Window::around) return call(Windows<Window::around, Window::around>{});
+    return call(Windows<Window::centred, Window::centred>{});
+}
+
+/// Frustum coordinates of a point, or of four: `Number` is long double or Lanes.
+template <class Number, int Sides>
+struct Coordinates {
+    Number at[Sides + 1];  ///< along L, (U,) D
+};
+
+template <class Number, int Sides>
+GEOMSRV_INLINE Coordinates<Number, Sides> to_frustum(const DistanceFrame<Number, Sides>& frame,
+                                                     const Number (&point)[Sides + 1]) {
+    Number x[Sides + 1];
+    for (int k = 0; k <= Sides; ++k) x[k] = point[k] - frame.origin[k];
+    Coordinates<Number, Sides> found;
+    for (int i = 0; i <= Sides; ++i) {
+        Number sum = frame.dual.row[i][0] * x[0];
+        for (int k = 1; k <= Sides; ++k) sum = sum + frame.dual.row[i][k] * x[k];
+        found.at[i] = sum;
+    }
+    return found;
+}
+
+template <class Number, int Sides>
+struct Projection {
+    Coordinates<Number, Sides> nearest;
+    Number region;  ///< FrustumRegion, a small whole number
+};
+
+/// Nearest point of the frustum in the metric in which L, U, D are orthonormal.
+template <class Kinds, class Number, int Sides>
+GEOMSRV_INLINE Projection<Number, Sides> project(const DistanceFrame<Number, Sides>& frame,
+                                                 const Coordinates<Number, Sides>& p) {
+    const Number z = p.at[Sides];
+    Number x[Sides];
+    for (int i = 0; i < Sides; ++i) x[i] = Kinds::kKind[i] == Window::centred ? magnitude(p.at[i]) : p.at[i];
+    Number root = z;
+    unrolled<Kinds::kMin>([&](auto s) __attribute__((always_inline)) {
+        Number lowest = z;  // S and T empty
+        unrolled<Kinds::kMax>([&](auto t) __attribute__((always_inline)) {
+            if constexpr (s + t > 0) {
+                const auto& candidate = frame.roots[s * Kinds::kMax + t];
+                Number r = candidate.depth * z;
+                for (int i = 0; i < Sides; ++i) r = r + candidate.side[i] * x[i];
+                lowest = t == 0 ? r : lesser(lowest, r);
+            }
+        });
+        root = s == 0 ? lowest : greater(root, lowest);
+    });
+    const Number near = frame.near, far = frame.far, none = 0.0;
+    Projection<Number, Sides> found;
+    const Number depth = lesser(greater(root, near), far);
+    found.nearest.at[Sides] = depth;
+    found.region = select(root < near, Number(9.0), select(far < root, Number(18.0), none));
+    for (int i = 0; i < Sides; ++i) {
+        const Number high = frame.high_slope[i] * depth;
+        const Number low = Kinds::kKind[i] == Window::centred ? -high : frame.low_slope[i] * depth;
+        found.nearest.at[i] = lesser(greater(p.at[i], low), high);
+        found.region = found.region + select(p.at[i] < low, frame.low_code[i],
+                                             select(high < p.at[i], frame.high_code[i], none));
+    }
+    return found;
+}
+
+/// bool for a number, LaneMask for Lanes.
+template <class Number>
+using Mask = decltype(Number() < Number());
+
+/// What is found for one point or four.
+template <class Number, int Sides>
+struct NearestPoint {
+    Number distance, lower, upper, region;
+    Coordinates<Number, Sides> offset;  ///< point minus its nearest point, in frustum coordinates
+    Mask<Number> inside;                ///< in the closed frustum
+    Mask<Number> in_range;              ///< nothing overflowed or underflowed; only of interest for Lanes
+};
+
+/// A point is proven to be inside if the room exceeds this times the reach.
+inline constexpr double kRoomError = 20.0 * kUnitRoundoff;
+
+/// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not count.
+inline constexpr double kMinSquare = 0x1p-900, kMaxSquare = 0x1p1000;
+
+/// Distance of p from its nearest point, and the interval that is proven to hold the exact value.
+template <class Kinds, bool Skewed, class Number, int Sides>
+GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, Sides>& frame,
+                                                   const Coordinates<Number, Sides>& p,
+                                                   const Coordinates<Number, Sides>& offset, const Number& region) {
+    const Number z = p.at[Sides], none = 0.0;
+    Number square = none;
+    for (int i = 0; i <= Sides; ++i) {
+        Number image = offset.at[i];
+        if constexpr (Skewed) {
+            for (int k = 0; k <= Sides; ++k) image = image + frame.defect.row[i][k] * offset.at[k];
+        }
+        square = i == 0 ? offset.at[i] * image : square + offset.at[i] * image;
+    }
+    // How far inside: the least scaled distance from the planes.  Sides compare rounded products; rounding is monotonic, so
+    // a point of the closed frustum is never taken for outside.
+    Number room = lesser(z - frame.near, frame.far - z);
+    Number reach = magnitude(z);
+    for (int i = 0; i < Sides; ++i) {
+        const Number size = magnitude(p.at[i]);
+        reach = reach + size;
+        if (Kinds::kKind[i] == Window::centred) {
+            room = lesser(room, (frame.high[i] * z - frame.view * size) * frame.high_room[i]);
+        } else {
+            const Number x = frame.view * p.at[i];
+            room = lesser(room, (x - frame.low[i] * z) * frame.low_room[i]);
+            room = lesser(room, (frame.high[i] * z - x) * frame.high_room[i]);
+        }
+    }
+    const Mask<Number> inside = none <= room;
+    const Number distance = select(inside, none, square_root(square));
+    const Number error = reach * frame.error_per_length + distance * frame.relative_error;
+    const Number lower = greater(distance - error, none);
+    const Number upper = select(reach * Number(kRoomError) < room, none, distance + error);
+    const Number square_if_outside = select(inside, Number(1.0), square);
+    const Mask<Number> in_range = (Number(kMinSquare) < square_if_outside) & (square_if_outside < Number(kMaxSquare));
+    return {distance, lower, upper, select(inside, none, region), offset, inside, in_range};
+}
+
+template <class Kinds, bool Skewed, class Number, int Sides>
+GEOMSRV_INLINE NearestPoint<Number, Sides> distance_to_frustum(const DistanceFrame<Number, Sides>& frame,
+                                                               const Number (&point)[Sides + 1]) {
+    const auto p = to_frustum(frame, point);
+    auto projection = project<Kinds>(frame, p);
+    Coordinates<Number, Sides> offset;
+    for (int i = 0; i <= Sides; ++i) offset.at[i] = p.at[i] - projection.nearest.at[i];
+    if constexpr (Skewed) {
+        for (int step = 0; step < frame.refinements; ++step) {
+            auto shifted = p;
+            for (int i = 0; i <= Sides; ++i) {
+                for (int k = 0; k <= Sides; ++k) {
+                    shifted.at[i] = shifted.at[i] + frame.defect.row[i][k] * offset.at[k];
+                }
+            }
+            projection = project<Kinds>(frame, shifted);
+            for (int i = 0; i <= Sides; ++i) offset.at[i] = p.at[i] - projection.nearest.at[i];
+        }
+    }
+    return measure<Kinds, Skewed>(frame, p, offset, projection.region);
+}
+
+/// Nearest point in the world frame.
+template <class Number, int Sides>
+GEOMSRV_INLINE Coordinates<Number, Sides> nearest_in_world(const DistanceFrame<Number, Sides>& frame,
+                                                           const Number (&point)[Sides + 1],
+                                                           const NearestPoint<Number, Sides>& found) {
+    Coordinates<Number, Sides> nearest;
+    for (int k = 0; k <= Sides; ++k) {
+        Number shift = found.offset.at[0] * frame.axes.row[0][k];
+        for (int i = 1; i <= Sides; ++i) shift = shift + found.offset.at[i] * frame.axes.row[i][k];
+        nearest.at[k] = select(found.inside, point[k], point[k] - shift);
+    }
+    return nearest;
+}
+
+/// What is asked for one point.
+template <int Sides>
+struct PointDistance {
+    double distance, lower, upper;  ///< [m]; 0 in the closed frustum
+    std::uint8_t region;            ///< FrustumRegion
+    double nearest[Sides + 1];      ///< world frame [m]
+};
+
+/// The same in long double, for numbers that are out of range.
+template <int Sides>
+PointDistance<Sides> distance_in_long_double(const DistanceFrame<long double, Sides>& frame, const double* point);
+
+}  // namespace geomsrv
