@@ -1,0 +1,51 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``geomsrv``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+# What follows these is handed on as it is: ROS has its own syntax (--ros-args -p name:=value).
+PASSED_ON = ("node", "demo")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a subcommand; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="geomsrv", description="Geometry queries for robots that state how accurate they are."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
+    commands.add_parser(
+        "node", help="run the ROS 2 node; takes ROS arguments, as --ros-args -p max_rate:=50.0", add_help=False
+    )
+    commands.add_parser("demo", help="a real robot, a node and a client; writes a picture", add_help=False)
+    commands.add_parser("self-check", help="answer built-in hard cases and report; needs no ROS")
+
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    command, rest = arguments[:1], arguments[1:]
+    if not (command and command[0] in PASSED_ON):
+        parser.parse_args(arguments)
+        return _self_check()
+    if command == ["demo"]:
+        from geomsrv import demo
+
+        return demo.main(rest)
+    try:
+        from geomsrv.ros import node
+    except ModuleNotFoundError as missing:
+        print(f"geomsrv node needs ROS 2, and {missing.name} is not installed", file=sys.stderr)
+        return 2
+    return node.main(rest)
+
+
+def _self_check() -> int:
+    from geomsrv.selfcheck import self_check
+
+    report = self_check()
+    print(report.message)
+    return 0 if report.ok else 1

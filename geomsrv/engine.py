@@ -1,0 +1,291 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the node evaluates, without ROS: a scene, a camera, a cross-check, and a plan of what is worth computing.
+
+The plan has three sources: what the configuration allows, what is asked for now, and what the scene contains.  A stage
+that is not active is never entered, and the counters prove it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geomsrv.answers import Distances, DistanceStatus
+from geomsrv.config import Config
+from geomsrv.crosscheck import CrossCheck
+from geomsrv.pairwise import ListedDistances, relative_poses
+from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
+from geomsrv.shapes import Frustum
+from geomsrv.world import World
+
+__all__ = ["Engine", "Evaluation", "SceneContacts", "Stage"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+CONTACTS, DISTANCES, VISIBLE, MARKERS = "contacts", "distances", "visible", "markers"  #: what can be asked for
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One line of the plan: an effect, whether it runs, and why."""
+
+    name: str
+    active: bool
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class SceneContacts:
+    """Pairs that touch now or within the horizon.
+
+    Attributes
+    ----------
+    pairs : PairContacts
+    depth : (n,) float64
+        Penetration depth of every pair now [m]; NaN where it was not computed.
+    horizon : float
+        [s]
+    checked : int
+        Pairs of the scene that are not allowed to touch.
+    """
+
+    pairs: PairContacts
+    depth: FloatArray
+    horizon: float
+    checked: int
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Answers of one evaluation; None where the plan says no."""
+
+    contacts: SceneContacts | None = None
+    distances: PairDistances | None = None
+    visible: SceneCull | None = None
+
+
+class Engine:
+    """A scene, a camera and a cross-check, evaluated by a plan.
+
+    Parameters
+    ----------
+    config : Config
+    transforms : callable, optional
+        As for `Scene`.
+
+    Attributes
+    ----------
+    scene : Scene
+    config : Config
+    camera : Frustum or None
+        In the fixed frame.
+    stamp : object
+        Time of the newest input, as it came; None before.
+    counters : Counter
+        How often each stage ran, by name.
+    cross_check : CrossCheck
+    """
+
+    def __init__(self, config: Config, transforms: Callable[[str], ArrayLike] | None = None) -> None:
+        self.scene = Scene(fixed_frame=config.fixed_frame, transforms=transforms)
+        self.config = config
+        self.camera: Frustum | None = None
+        self.stamp: Any = None
+        self.counters: Counter[str] = Counter()
+        self.cross_check = _cross_check(config)
+
+    def configure(self, config: Config) -> None:
+        """Change the configuration; the scene stays."""
+        before, self.config = self.config, config
+        if _cross_check_settings(before) != _cross_check_settings(config):
+            self.cross_check.close()
+            self.cross_check = _cross_check(config)
+
+    def close(self) -> None:
+        """Stop the cross-check's process."""
+        self.cross_check.close()
+
+    # ------------------------------------------------------------------------------------------------------ inputs
+
+    def apply(self, update: SceneUpdate, stamp: Any = None) -> int:
+        """Change the scene as a whole or not at all; returns its version."""
+        version = self.scene.apply(update)
+        self.stamp = stamp
+        self.counters["updates"] += 1
+        return version
+
+    def set_states(self, ids: Sequence[str], poses: ArrayLike, twists: ArrayLike | None, stamp: Any = None) -> int:
+        """Move objects; returns the scene's version."""
+        version = self.scene.set_states(ids, poses, twists, stamp)
+        self.stamp = stamp
+        self.counters["states"] += 1
+        return version
+
+    @property
+    def moving_count(self) -> int:
+        """Number of objects with a velocity."""
+        world = self.scene.world
+        return int((world.moves | world.turns).sum())
+
+    # ---------------------------------------------------------------------------------------------------- the plan
+
+    def plan(self, asked: frozenset[str]) -> list[Stage]:
+        """Which effects an evaluation runs, and why.
+
+        Parameters
+        ----------
+        asked : frozenset of str
+            Topics that somebody listens to: `CONTACTS`, `DISTANCES`, `VISIBLE`, `MARKERS`.
+        """
+        config = self.config
+        cull = (
+            (not config.effects_cull, "switched off by effects.cull"),
+            (VISIBLE not in asked, "nobody listens to ~/visible"),
+            (self.camera is None, "no ~/camera_info yet"),
+        )
+        distance = (
+            (not config.effects_distance, "switched off by effects.distance"),
+            (DISTANCES not in asked, "nobody listens to ~/distances"),
+        )
+        # A drawing shows contacts, so it asks for them too.
+        contact = ((not asked & {CONTACTS, MARKERS}, "nobody listens to ~/contacts"),)
+        return [
+            _stage("cull", *cull),
+            _stage("distance", *distance),
+            _stage("witness", *distance, (not config.effects_witness, "switched off by effects.witness")),
+            _stage("contact", *contact),
+            _stage(
+                "first_contact",
+                *contact,
+                (not config.effects_first_contact, "switched off by effects.first_contact"),
+                (config.horizon == 0.0, "the horizon is 0"),
+                (self.moving_count == 0, "nothing moves"),
+            ),
+            _stage("contact_set", *contact, (not config.effects_contact_set, "switched off by effects.contact_set")),
+            _stage(
+                "penetration",
+                (not asked & {CONTACTS, DISTANCES, MARKERS}, "nobody listens to ~/contacts or ~/distances"),
+                (not config.effects_penetration, "switched off by effects.penetration"),
+            ),
+            _stage(
+                "cross_check",
+                (config.cross_check_mode == "off", "cross_check.mode is off"),
+                (not self.cross_check.available, self.cross_check.reason),
+                *distance,
+            ),
+            _stage(
+                "markers",
+                (not config.effects_markers, "switched off by effects.markers"),
+                (MARKERS not in asked, "nobody listens to ~/markers"),
+            ),
+        ]
+
+    # -------------------------------------------------------------------------------------------------- evaluation
+
+    def evaluate(self, asked: frozenset[str]) -> Evaluation:
+        """Answers for the topics that somebody listens to, `asked` as for `plan`."""
+        on = frozenset(stage.name for stage in self.plan(asked) if stage.active)
+        self.counters["evaluations"] += 1
+        try:
+            return Evaluation(
+                contacts=self._contacts(on) if "contact" in on else None,
+                distances=self._distances(on) if "distance" in on else None,
+                visible=self._visible() if "cull" in on else None,
+            )
+        except Exception:
+            self.counters["evaluations failed"] += 1
+            raise
+
+    def _visible(self) -> SceneCull:
+        assert self.camera is not None  # the plan says so
+        self.counters["cull"] += 1
+        return self.scene.cull(self.camera, accuracy=self.config.accuracy)
+
+    def _distances(self, on: frozenset[str]) -> PairDistances:
+        self.counters["distance"] += 1
+        want = ["distance", *(effect for effect in ("witness", "penetration") if effect in on)]
+        for effect in want[1:]:
+            self.counters[effect] += 1
+        answer = self.scene.distances(self.config.max_distance, want=want, accuracy=self.config.accuracy)
+        if "cross_check" in on:
+            self.counters["cross_check"] += 1
+            self.cross_check.submit_scene(self.scene, answer)
+        if "witness" not in on:
+            nowhere = np.full_like(answer.normal, np.nan)
+            answer = replace(answer, point_a=nowhere, point_b=nowhere, normal=nowhere)
+        return answer
+
+    def _contacts(self, on: frozenset[str]) -> SceneContacts:
+        self.counters["contact"] += 1
+        horizon = self.config.horizon if "first_contact" in on else 0.0
+        self.counters["first_contact"] += "first_contact" in on
+        pairs = self.scene.first_contacts(horizon, accuracy=self.config.accuracy)
+        if "contact_set" in on:
+            self.counters["contact_set"] += 1
+        else:
+            pairs = replace(pairs, points=np.zeros((0, 3)), point_offsets=np.zeros(len(pairs) + 1, np.int64))
+        depth = np.full(len(pairs), np.nan)
+        if "penetration" in on and (pairs.time == 0.0).any():
+            self.counters["penetration"] += 1
+            depth = _depths(pairs, self.scene.contacts(accuracy=self.config.accuracy))
+        counts = pairs.cost.counts
+        return SceneContacts(pairs, depth, horizon, counts.get("pairs", 0) - counts.get("allowed", 0))
+
+    def check(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> None:
+        """Hand distances of (n, 2) rows of `world` to the cross-check, if it is on."""
+        rows = np.flatnonzero(answer.status != DistanceStatus.UNSUPPORTED)
+        if self.config.cross_check_mode == "off" or len(rows) == 0:
+            return
+        pairs, shapes, ids = pairs[rows], [world.table.shapes[k] for k in world.shape.tolist()], world.ids
+        # The cross-check wants what the query got and gave: everything in the frame of a.
+        turn, origin = world.rotations[pairs[:, 0]], world.poses[pairs[:, 0], :3]
+
+        def local(vectors: FloatArray) -> FloatArray:
+            return np.einsum("kji,kj->ki", turn, vectors)
+
+        self.cross_check.submit(
+            [(shapes[i], shapes[j]) for i, j in pairs.tolist()],
+            relative_poses(world, pairs),
+            Distances(
+                distance=answer.distance[rows],
+                lower=answer.lower[rows],
+                upper=answer.upper[rows],
+                point_b=local(answer.point_b[rows] - origin),
+                status=answer.status[rows],
+                cost=answer.cost,
+                _point_a=local(answer.point_a[rows] - origin),
+                _normal=local(answer.normal[rows]),
+            ),
+            [f"{ids[i]} {ids[j]}" for i, j in pairs.tolist()],
+        )
+        self.counters["cross_check"] += 1
+
+
+def _stage(name: str, *obstacles: tuple[bool, str]) -> Stage:
+    """A stage runs unless something is in its way; the first of that is the reason."""
+    for is_there, reason in obstacles:
+        if is_there:
+            return Stage(name, False, reason)
+    return Stage(name, True, "asked for")
+
+
+def _depths(pairs: PairContacts, now: PairDistances) -> FloatArray:
+    """Penetration depth of each pair; 0 for a pair that just touches, NaN for one that does not touch now."""
+    depth = {(a, b): -min(d, 0.0) for a, b, d in zip(now.ids_a, now.ids_b, now.distance.tolist(), strict=True)}
+    return np.array([depth.get(pair, np.nan) for pair in zip(pairs.ids_a, pairs.ids_b, strict=True)])
+
+
+def _cross_check_settings(config: Config) -> tuple[str, float, float]:
+    return config.cross_check_mode, config.cross_check_sample_fraction, config.cross_check_timeout
+
+
+def _cross_check(config: Config) -> CrossCheck:
+    mode, fraction, timeout = _cross_check_settings(config)
+    return CrossCheck(mode, sample_fraction=fraction, timeout_s=timeout)

@@ -1,0 +1,514 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Requests to responses.  No ROS: anything with the fields of a request or response will do.
+
+A handler computes first and fills the response last, so that a refusal never leaves half an answer behind.
+"""
+
+from __future__ import annotations
+
+import functools
+import traceback
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geomsrv import _validate, queries
+from geomsrv.answers import ContactStatus, Cost, DistanceStatus
+from geomsrv.engine import Engine
+from geomsrv.errors import GeometryError, NotAvailableError, SceneError
+from geomsrv.pairwise import ListedContacts, ListedDistances, listed_distances, listed_first_contacts, world_of
+from geomsrv.ros import convert
+from geomsrv.scene import PairContacts, SceneUpdate
+from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
+from geomsrv.visibility import sight
+from geomsrv.world import World, gather
+
+__all__ = ["Handlers"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# The constants `status` of every service.
+OK, BAD_REQUEST, UNSUPPORTED, NOT_AVAILABLE, NOT_ACTIVE, INTERNAL_ERROR = range(6)
+
+BY_IDS, INLINE, ALL = range(3)  # the constants `select`
+CAMERA, FRUSTUM = range(2)  # the constants `view` of Cull.srv
+BOXES, POLYGONS, POLYTOPES, FRUSTUM_KIND, POINTS = range(101, 106)  # the first group of DistanceBatch.srv
+
+
+class _NotActive(Exception):
+    """The node is not in lifecycle state "active"."""
+
+
+Method = Callable[["Handlers", Any, Any], Any]
+
+
+def _answered(*, inactive: bool = False) -> Callable[[Callable[[Handlers, Any, Any], None]], Method]:
+    """Make every request end in an answer with a status and a message; by default, only while the node is active."""
+
+    def decorate(answer: Callable[[Handlers, Any, Any], None]) -> Method:
+        @functools.wraps(answer)
+        def respond(self: Handlers, request: Any, response: Any) -> Any:
+            if not (inactive or self.active()):
+                return _refusal(response, NOT_ACTIVE, "the node is not active")
+            try:
+                answer(self, request, response)
+                return response
+            except SceneError as fault:
+                refusal = _refusal(response, BAD_REQUEST, str(fault))
+                if hasattr(refusal, "faults"):
+                    refusal.ids, refusal.faults = list(fault.errors), list(fault.errors.values())
+                return refusal
+            except NotAvailableError as fault:
+                return _refusal(response, NOT_AVAILABLE, str(fault))
+            except GeometryError as fault:
+                return _refusal(response, BAD_REQUEST, str(fault))
+            except Exception as error:  # a fault of ours: the caller hears of it, the log has where it was
+                self.log(f"{answer.__name__}: {traceback.format_exc()}")
+                return _refusal(response, INTERNAL_ERROR, f"{type(error).__name__}: {error}")
+
+        return respond
+
+    return decorate
+
+
+def _refusal(response: Any, status: int, message: str) -> Any:
+    """An empty response of the same type, whatever had been filled in."""
+    refusal = type(response)()
+    refusal.status, refusal.message = status, message
+    return refusal
+
+
+def _told(answer: Callable[[Handlers, Any], tuple[bool, str]]) -> Method:
+    """A handler of std_srvs/Trigger or SetBool: success and message."""
+
+    @functools.wraps(answer)
+    def respond(self: Handlers, request: Any, response: Any) -> Any:
+        try:
+            response.success, response.message = answer(self, request)
+        except Exception as error:
+            self.log(f"{answer.__name__}: {traceback.format_exc()}")
+            response.success, response.message = False, f"{type(error).__name__}: {error}"
+        return response
+
+    return respond
+
+
+class Handlers:
+    """Answers requests from an engine.
+
+    Parameters
+    ----------
+    engine : Engine
+    active : callable
+        Whether queries are to be answered now.
+    log : callable
+        Takes the text of an error.
+    object_type : callable
+        geomsrv/SceneObject.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        active: Callable[[], bool],
+        log: Callable[[str], None],
+        object_type: Callable[[], Any],
+    ) -> None:
+        self.engine = engine
+        self.active = active
+        self.log = log
+        self.object_type = object_type
+
+    # ------------------------------------------------------------------------------------------------------- scene
+
+    def apply_scene(self, request: Any, response: Any) -> Any:
+        """ApplyScene.srv."""
+        response = self._apply_scene(request, response)
+        response.version = self.engine.scene.version
+        return response
+
+    @_answered(inactive=True)
+    def _apply_scene(self, request: Any, response: Any) -> None:
+        self.engine.apply(convert.update_from(request.update), request.update.header.stamp)
+
+    @_answered(inactive=True)
+    def get_scene(self, request: Any, response: Any) -> None:
+        """GetScene.srv."""
+        scene = self.engine.scene
+        ids = request.ids or scene.ids
+        unknown = [name for name in ids if name not in scene]
+        if unknown:
+            raise SceneError({name: "no such object" for name in unknown})
+        objects = []
+        for name in ids:
+            message = self.object_type()
+            convert.set_object(message, scene[name])
+            objects.append(message)
+        response.scene.add = objects
+        response.scene.header.frame_id = self.engine.config.fixed_frame
+        pairs = sorted(scene.allowed_pairs)
+        response.scene.allow_a, response.scene.allow_b = [a for a, _ in pairs], [b for _, b in pairs]
+        response.version = scene.version
+
+    @_told
+    def clear(self, request: Any) -> tuple[bool, str]:
+        """std_srvs/Trigger: remove every object."""
+        self.engine.apply(SceneUpdate(clear=True))
+        return True, ""
+
+    @_told
+    def self_check(self, request: Any) -> tuple[bool, str]:
+        """std_srvs/Trigger: answer built-in hard cases."""
+        # Loaded on use: it brings its cases along.
+        from geomsrv.selfcheck import self_check
+
+        report = self_check()
+        return report.ok, report.message
+
+    # ----------------------------------------------------------------------------------------------------- queries
+
+    @_answered()
+    def cull(self, request: Any, response: Any) -> None:
+        """Cull.srv."""
+        accuracy = self._quality(request)
+        self._allowed("cull")
+        frustum, scene = self._frustum(request), self.engine.scene
+        if request.select == INLINE:
+            _unused(request, "ids")
+            world, counts = world_of(*_bodies(request.shapes, request.poses, (), "")), Counter[str]()
+            state, certain, boxed = sight(world, np.arange(len(world)), frustum, counts)
+            message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
+            cost = Cost(0, accuracy, dict(counts))
+        elif request.select in (BY_IDS, ALL):
+            _unused(request, "shapes", "poses", *(("ids",) if request.select == ALL else ()))
+            answer = scene.cull(frustum, ids=None if request.select == ALL else request.ids, accuracy=accuracy)
+            state, certain, message, cost = answer.state, answer.certain, answer.message, answer.cost
+            ids = answer.ids
+            if request.select == BY_IDS and ids != request.ids:
+                row, ids = {name: i for i, name in enumerate(ids)}, request.ids
+                order = np.array([row[name] for name in ids], dtype=np.intp)
+                state, certain = state[order], certain[order]
+            response.ids, response.scene_version = ids, answer.version
+        else:
+            raise GeometryError(f"select must be BY_IDS, INLINE or ALL, got {request.select}")
+        response.message = message
+        response.states, response.certain = convert.bytes_(state), convert.bytes_(certain)
+        convert.set_cost(response.cost, cost)
+
+    @_answered()
+    def distance(self, request: Any, response: Any) -> None:
+        """Distance.srv."""
+        accuracy = self._quality(request)
+        self._allowed("distance")
+        want = self._want(request, "distance", "witness", "penetration")
+        if request.select == ALL:
+            _unused(request, *_BY_IDS, *_INLINE)
+            self._all_distances(request, response, want, accuracy)
+            return
+        if request.select == BY_IDS and request.ids_a and not request.ids_b:
+            _unused(request, *_INLINE)
+            world, pairs, lonely = self._nearest(request.ids_a, accuracy)
+        else:
+            (world, pairs), lonely = self._listed(request), ""
+        answer = listed_distances(world, pairs, want=want, accuracy=accuracy)
+        self.engine.check(world, pairs, answer)
+        if request.select == BY_IDS:
+            _set_ids(response, world, pairs)
+        _set_distances(response, answer, want)
+        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message, lonely)
+
+    def _nearest(self, ids: Sequence[str], accuracy: str) -> tuple[World, IntArray, str]:
+        """Every id with the object nearest to it, and words about those that have none."""
+        scene, pairs, lonely = self.engine.scene, [], []
+        world = scene.world
+        for name in ids:
+            answer = scene.nearest_pair(ids=[name], accuracy=accuracy)
+            if len(answer):
+                other = answer.ids_b[0] if answer.ids_a[0] == name else answer.ids_a[0]
+                pairs.append((world.index[name], world.index[other]))
+            else:
+                lonely.append(f"{name!r} has no object to be compared with")
+        return world, _pairs_array(pairs), "; ".join(lonely)
+
+    def _all_distances(self, request: Any, response: Any, want: tuple[str, ...], accuracy: str) -> None:
+        """Every pair within max_distance, nearest first, then those that are unsupported."""
+        world = self.engine.scene.world
+        near = self.engine.scene.distances(request.max_distance, want=want, accuracy=accuracy)
+        pairs = [(world.index[a], world.index[b]) for a, b in zip(near.ids_a, near.ids_b, strict=True)]
+        order = np.argsort(near.distance, kind="stable")
+        found = _pairs_array(pairs)[order]
+        missing = _pairs_array([(world.index[a], world.index[b]) for a, b, _ in near.unsupported])
+        _set_ids(response, world, np.concatenate([found, missing]))
+        answer = ListedDistances(
+            status=_extended(near.status[order], len(missing), DistanceStatus.UNSUPPORTED),
+            **{name: _extended(getattr(near, name)[order], len(missing), np.nan) for name in _DISTANCE_COLUMNS},
+            message=near.message,
+            cost=near.cost,
+        )
+        self.engine.check(world, np.concatenate([found, missing]), answer)
+        _set_distances(response, answer, want)
+        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, near.message)
+
+    @_answered()
+    def first_contact(self, request: Any, response: Any) -> None:
+        """FirstContact.srv."""
+        accuracy = self._quality(request)
+        self._allowed("first_contact")
+        want = self._want(request, "first_contact", "contact_set")
+        answer: PairContacts | ListedContacts
+        if request.select == ALL:
+            _unused(request, *_BY_IDS, *_INLINE, "twists_a", "twists_b")
+            answer = self.engine.scene.first_contacts(request.horizon, accuracy=accuracy)
+            order = np.argsort(answer.time, kind="stable")
+            response.ids_a = [answer.ids_a[i] for i in order.tolist()]
+            response.ids_b = [answer.ids_b[i] for i in order.tolist()]
+            response.scene_version = answer.version
+        else:
+            world, pairs = self._listed(request, moving=True)
+            answer = listed_first_contacts(world, pairs, request.horizon, accuracy=accuracy)
+            order = np.arange(len(pairs))
+            if request.select == BY_IDS:
+                _set_ids(response, world, pairs)
+        _set_first_contacts(response, answer, order, want)
+        _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
+
+    @_answered()
+    def cull_batch(self, request: Any, response: Any) -> None:
+        """CullBatch.srv."""
+        accuracy = self._quality(request)
+        self._allowed("cull")
+        frustum = convert.frustum_of(request.frustum)
+        boxes = Boxes(
+            convert.rows(request.centers, "centers", 3),
+            convert.rows(request.axes, "axes", 9).reshape(-1, 3, 3),
+            convert.rows(request.half_extents, "half_extents", 3),
+        )
+        answer = queries.cull(frustum, boxes, accuracy=accuracy)
+        response.states, response.certain = convert.bytes_(answer.state), convert.bytes_(answer.certain)
+        convert.set_cost(response.cost, answer.cost)
+
+    @_answered()
+    def distance_batch(self, request: Any, response: Any) -> None:
+        """DistanceBatch.srv."""
+        accuracy = self._quality(request)
+        want = self._want(request, "distance", "witness", "penetration")
+        sides = [
+            _side(getattr(request, f"kind_{s}"), getattr(request, f"values_{s}"), getattr(request, f"offsets_{s}"), s)
+            for s in "ab"
+        ]
+        a, b = sides
+        if isinstance(b, np.ndarray):
+            if not isinstance(a, Frustum):
+                raise GeometryError("kind_b POINTS needs kind_a FRUSTUM")
+            _unused(request, "poses_ab")
+            answer = queries.distance_to_frustum(a, b, accuracy=accuracy, want=want)
+        elif min(request.kind_a, request.kind_b) >= BOXES:
+            _unused(request, "poses_ab")
+            answer = queries.distance(a, b, accuracy=accuracy, want=want)
+        elif max(request.kind_a, request.kind_b) < BOXES:
+            poses = convert.rows(request.poses_ab, "poses_ab", 7)
+            answer = queries.distance(a, b, poses, accuracy=accuracy, want=want)
+        else:
+            raise GeometryError("kind_a and kind_b must both be batches, or both be shapes of Shape.msg")
+        _set_distances(response, answer, want)
+        if answer.region is not None:
+            response.region = convert.bytes_(answer.region)
+        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message)
+
+    @_answered()
+    def first_contact_batch(self, request: Any, response: Any) -> None:
+        """FirstContactBatch.srv."""
+        accuracy = self._quality(request)
+        self._allowed("first_contact")
+        want = self._want(request, "contact_set")
+        dimension = request.dimension
+        if dimension not in (2, 3):
+            raise GeometryError(f"dimension must be 2 or 3, got {dimension}")
+        batch = Polygons if dimension == 2 else Polytopes
+        a, b = (
+            batch(
+                convert.rows(getattr(request, f"vertices_{s}"), f"vertices_{s}", dimension),
+                np.asarray(getattr(request, f"offsets_{s}"), dtype=np.int64),
+            )
+            for s in "ab"
+        )
+        velocities = []
+        for name in ("velocities_a", "velocities_b"):
+            rows = convert.rows(getattr(request, name), name, dimension)
+            velocities.append(rows[0] if len(rows) == 1 else rows)
+        answer = queries.first_contact(
+            a, b, *velocities, t_max=request.t_max, accuracy=accuracy, contact_set="contact_set" in want
+        )
+        _set_first_contacts(response, answer, np.arange(len(answer.status)), want)
+        _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
+
+    # ---------------------------------------------------------------------------------------------------- requests
+
+    def _quality(self, request: Any) -> str:
+        """Tier asked for, by default that of the configuration."""
+        if request.tolerance != 0.0:
+            raise NotAvailableError(f"tolerance={request.tolerance:g} is not available yet; it must be 0")
+        return _validate.accuracy(request.accuracy or self.engine.config.accuracy)
+
+    def _allowed(self, *effects: str) -> None:
+        """Refuse what the configuration has switched off."""
+        for effect in effects:
+            if not getattr(self.engine.config, f"effects_{effect}", True):
+                raise NotAvailableError(f"{effect} is switched off by the parameter effects.{effect}")
+
+    def _want(self, request: Any, *known: str) -> tuple[str, ...]:
+        effects = tuple(_validate.want(request.want, known))
+        self._allowed(*effects)
+        return effects
+
+    def _frustum(self, request: Any) -> Frustum:
+        if request.view == FRUSTUM:
+            return convert.frustum_from(request.frustum)
+        if request.view != CAMERA:
+            raise GeometryError(f"view must be CAMERA or FRUSTUM, got {request.view}")
+        if self.engine.camera is None:
+            raise NotAvailableError("no ~/camera_info has come yet")
+        return self.engine.camera
+
+    def _listed(self, request: Any, *, moving: bool = False) -> tuple[World, IntArray]:
+        """Objects and pairs that a request lists, by id or inline."""
+        inline = (*_INLINE, *(("twists_a", "twists_b") if moving else ()))
+        if request.select == BY_IDS:
+            _unused(request, *inline)
+            world = self.engine.scene.world
+            a, b = (_rows_of(world, getattr(request, name), name) for name in _BY_IDS)
+            names = _BY_IDS
+        elif request.select == INLINE:
+            _unused(request, *_BY_IDS)
+            sides = [
+                _bodies(
+                    getattr(request, f"shapes_{s}"),
+                    getattr(request, f"poses_{s}"),
+                    getattr(request, f"twists_{s}") if moving else (),
+                    f"_{s}",
+                )
+                for s in "ab"
+            ]
+            world = world_of(sides[0][0] + sides[1][0], *(np.concatenate([sides[0][k], sides[1][k]]) for k in (1, 2)))
+            count = len(sides[0][0])
+            a, b = np.arange(count), np.arange(count, len(world))
+            names = ("shapes_a", "shapes_b")
+        else:
+            raise GeometryError(f"select must be BY_IDS, INLINE or ALL_PAIRS, got {request.select}")
+        if len(a) != len(b) and 1 not in (len(a), len(b)):
+            raise GeometryError(
+                f"{names[0]} and {names[1]} have {len(a)} and {len(b)} items; they must be as many, or one"
+            )
+        return world, np.column_stack(np.broadcast_arrays(a, b))
+
+
+_BY_IDS = ("ids_a", "ids_b")
+_INLINE = ("shapes_a", "poses_a", "shapes_b", "poses_b")
+
+
+def _unused(request: Any, *names: str) -> None:
+    """Refuse fields that the request's choice does not use: whoever fills them expects them to count."""
+    for name in names:
+        if len(getattr(request, name)):
+            raise GeometryError(f"{name} must be empty here")
+
+
+def _rows_of(world: World, ids: Sequence[str], name: str) -> IntArray:
+    unknown = [f"{name}[{i}] is {item!r}" for i, item in enumerate(ids) if item not in world.index]
+    if unknown:
+        raise GeometryError(f"{', '.join(unknown)}: no such object")
+    return np.array([world.index[item] for item in ids], dtype=np.int64)
+
+
+def _bodies(
+    shapes: Sequence[Any], poses: Any, twists: Any, suffix: str
+) -> tuple[list[convert.AnyShape], FloatArray, FloatArray]:
+    """Shapes, poses (n, 7) and twists (n, 6) of an inline list."""
+    bodies = []
+    for i, item in enumerate(shapes):
+        try:
+            bodies.append(convert.shape_from(item))
+        except GeometryError as fault:
+            raise GeometryError(f"shapes{suffix}[{i}]: {fault}") from None
+    placed, moving = convert.rows(poses, f"poses{suffix}", 7), convert.rows(twists, f"twists{suffix}", 6)
+    if len(placed) != len(bodies):
+        raise GeometryError(f"shapes{suffix} are {len(bodies)}, poses{suffix} are of {len(placed)}")
+    if len(twists) == 0:
+        moving = np.zeros((len(bodies), 6))
+    elif len(moving) != len(bodies):
+        raise GeometryError(f"shapes{suffix} are {len(bodies)}, twists{suffix} are of {len(moving)}")
+    return bodies, _validate.poses(placed, f"poses{suffix}"), _validate.floats(moving, f"twists{suffix}", (None, 6))
+
+
+def _side(kind: int, values: Any, offsets: Any, side: str) -> Any:
+    """One of the two operands of DistanceBatch.srv; an array for points."""
+    name = f"values_{side}"
+    if kind not in (POLYGONS, POLYTOPES) and len(offsets):
+        raise GeometryError(f"offsets_{side} must be empty here")
+    if kind < BOXES:
+        codec = convert.shape_codec(kind)
+        return convert.shape_of(kind, values if codec.dimensions else (), values if codec.width else ())
+    if kind == BOXES:
+        rows = convert.rows(values, name, 15)
+        return Boxes(rows[:, :3], rows[:, 3:12].reshape(-1, 3, 3), rows[:, 12:])
+    if kind == POLYGONS:
+        return Polygons(convert.rows(values, name, 2), np.asarray(offsets, dtype=np.int64))
+    if kind == POLYTOPES:
+        return Polytopes(convert.rows(values, name, 3), np.asarray(offsets, dtype=np.int64))
+    if kind == FRUSTUM_KIND:
+        return convert.frustum_of(values, name)
+    if kind == POINTS and side == "b":
+        return convert.rows(values, name, 3)
+    raise GeometryError(
+        f"kind_{side} {kind} is not one of the constants of DistanceBatch.srv and Shape.msg that fit here"
+    )
+
+
+# ---------------------------------------------------------------------------------------------------- responses
+
+_DISTANCE_COLUMNS = ("distance", "lower", "upper", "point_a", "point_b", "normal")
+_CONTACT_COLUMNS = ("time", "time_lower", "time_upper", "last_time", "normal")
+
+
+def _pairs_array(pairs: Sequence[tuple[int, int]]) -> IntArray:
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _extended(column: NDArray[Any], count: int, value: float) -> NDArray[Any]:
+    """`column` with `count` more rows of `value`."""
+    return np.concatenate([column, np.full((count, *column.shape[1:]), value, column.dtype)])
+
+
+def _set_ids(response: Any, world: World, pairs: IntArray) -> None:
+    response.ids_a = [world.ids[i] for i in pairs[:, 0].tolist()]
+    response.ids_b = [world.ids[i] for i in pairs[:, 1].tolist()]
+    response.scene_version = world.version
+
+
+def _set_distances(response: Any, answer: Any, want: tuple[str, ...]) -> None:
+    response.item_status = convert.bytes_(answer.status)
+    for name in _DISTANCE_COLUMNS[: None if "witness" in want else 3]:
+        setattr(response, name, convert.doubles(getattr(answer, name)))
+    convert.set_cost(response.cost, answer.cost)
+
+
+def _set_first_contacts(response: Any, answer: Any, order: IntArray, want: tuple[str, ...]) -> None:
+    response.item_status = convert.bytes_(answer.status[order])
+    for name in _CONTACT_COLUMNS:
+        setattr(response, name, convert.doubles(getattr(answer, name)[order]))
+    if "contact_set" in want:
+        points, offsets = gather(answer.points, answer.point_offsets, order)
+        response.points, response.point_offsets = convert.doubles(points), convert.uint32s(offsets)
+    convert.set_cost(response.cost, answer.cost)
+
+
+def _set_unsupported(response: Any, items: NDArray[np.bool_], *reasons: str) -> None:
+    """Status and message, where there is anything to say."""
+    text = "; ".join(filter(None, reasons))
+    if text or items.any():
+        response.status, response.message = UNSUPPORTED, text or "no kernel for some of the items"
