@@ -73,7 +73,8 @@ def test_command_runs(place):
 def test_node_is_an_executable_of_the_package():
     node = PREFIX / "lib" / "geomsrv" / "node"
     assert os.access(node, os.X_OK)
-    assert node.read_text().startswith(f"#!{sys.executable}")
+    interpreter = Path(node.read_text().splitlines()[0].removeprefix("#!"))
+    assert interpreter.parent == Path(sys.executable).parent
 
 
 def test_stub_names_what_the_module_has():
