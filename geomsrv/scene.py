@@ -442,7 +442,7 @@ class Scene:
                 turning[rows] = twists
             self._version += 1
             self._stamp = stamp if stamp is not None else self._stamp
-            self._world = replace(world, poses=moved, twists=turning, version=self._version, stamp=self._stamp)
+            self._world = world.moved(moved, turning, self._version, self._stamp)
             return self._version
 
     def distances(

@@ -53,7 +53,7 @@ def sight(world: World, rows: IntArray, frustum: Frustum, counts: Counter[str]) 
     state, certain = _by_box(world, rows, frustum)
     counts["boxes"] += len(rows)
     unbounded = world.table.unbounded[world.shape[rows]]
-    exact = _are_boxes(world, rows) & (world.uncertainty[rows] == 0.0)
+    exact = world.table.boxes[world.shape[rows]] & (world.uncertainty[rows] == 0.0)
     outcome = state.astype(np.uint8)
     # A bounding box that is outside or inside speaks for what it holds; one that is cut says nothing yet.
     cut = np.flatnonzero(((state == CullState.INTERSECTS) & ~exact) | unbounded)
@@ -70,18 +70,13 @@ def _by_box(world: World, rows: IntArray, frustum: Frustum) -> tuple[ByteArray, 
     turn = world.rotations[rows]
     position = world.poses[rows, :3]
     half = table.half[shape] + table.round[shape][:, None]
-    exact = _are_boxes(world, rows)
+    exact = table.boxes[shape]
     scale = np.abs(position).max(axis=1, initial=0.0) + table.reach[shape]
     margin = np.where(exact | np.isinf(scale), 0.0, AABB_ROUNDING * scale) + world.uncertainty[rows]
     center = position + np.einsum("nij,nj->ni", turn, table.center[shape])
     axes = np.ascontiguousarray(np.swapaxes(turn, 1, 2))
     state, certain, _ = _core.cull(frustum.packed(), center, axes, half + margin[:, None])
     return state, certain
-
-
-def _are_boxes(world: World, rows: IntArray) -> BoolArray:
-    boxes = np.array([isinstance(shape, Box) for shape in world.table.shapes], dtype=bool)
-    return boxes[world.shape[rows]]
 
 
 def boxed_kinds(world: World) -> list[str]:
@@ -154,19 +149,15 @@ def _planes(frustum: Frustum) -> tuple[FloatArray, FloatArray]:
 def _depths_inside(world: World, rows: IntArray, frustum: Frustum) -> tuple[FloatArray, FloatArray]:
     """How far every object could grow and still be in the frustum (negative: it sticks out), and the rounding in it."""
     normals, offsets = _planes(frustum)
-    depth, rounding = np.empty(len(rows)), np.empty(len(rows))
-    for k, row in enumerate(rows.tolist()):
-        shape = world.table.shapes[world.shape[row]]
-        local = normals @ world.rotations[row]
-        position = world.poses[row, :3] - frustum.origin
-        # A support h(n) is the farthest extent along n; a shape is on the inner side of a plane if its
-        # support is.
-        depth[k] = (offsets - normals @ position - _supports(shape, local)).min()
-        reach = world.table.reach[world.shape[row]]
-        rounding[k] = AABB_ROUNDING * (
-            np.abs(frustum.origin).max() + np.abs(position).max() + frustum.far + (reach if np.isfinite(reach) else 0.0)
-        )
-    return depth, rounding
+    position = world.poses[rows, :3] - frustum.origin
+    local = np.einsum("pi,kij->kpj", normals, world.rotations[rows])
+    shapes = [world.table.shapes[k] for k in world.shape[rows].tolist()]
+    # A support is the farthest extent along a normal; a shape is behind a plane if its support is.
+    support = np.array([_supports(shape, along) for shape, along in zip(shapes, local, strict=True)]).reshape(-1, 6)
+    depth = (offsets - position @ normals.T - support).min(axis=1)
+    reach = world.table.reach[world.shape[rows]]
+    scale = np.abs(frustum.origin).max() + np.abs(position).max(axis=1) + frustum.far
+    return depth, AABB_ROUNDING * (scale + np.where(np.isfinite(reach), reach, 0.0))
 
 
 def _supports(shape: AnyShape, directions: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ are.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -50,8 +50,8 @@ class ShapeTable:
         As the engine reads them.
     kind_names, kind : tuple of str, (m,) int64
         Kinds that occur, sorted, and which of them each shape is.
-    planar, unbounded : (m,) bool
-        Polygons; half spaces.
+    planar, unbounded, boxes : (m,) bool
+        Polygons; half spaces; boxes.
     center, half, round : (m, 3), (m, 3), (m,) float64
         The shape lies in the box center +- half, grown by `round` on all sides, in its own frame; 0 for half
         spaces.
@@ -67,6 +67,7 @@ class ShapeTable:
     kind: IntArray
     planar: BoolArray
     unbounded: BoolArray
+    boxes: BoolArray
     center: FloatArray
     half: FloatArray
     round: FloatArray
@@ -89,6 +90,7 @@ class ShapeTable:
             kind=np.array([names.index(shape.kind) for shape in rows], dtype=np.int64),
             planar=np.array([isinstance(shape, Polygon) for shape in rows], dtype=bool),
             unbounded=np.array([isinstance(shape, HalfSpace) for shape in rows], dtype=bool),
+            boxes=np.array([isinstance(shape, Box) for shape in rows], dtype=bool),
             center=np.ascontiguousarray(bounds[:, 0:3]),
             half=np.ascontiguousarray(bounds[:, 3:6]),
             round=np.ascontiguousarray(bounds[:, 6]),
@@ -192,6 +194,15 @@ class World:
         nothing = np.zeros(0)
         poses, twists = np.zeros((0, 7)), np.zeros((0, 6))
         return cls((), {}, ShapeTable.of(()), rows, nothing, nothing, {}, poses, twists, rows, 0, None)
+
+    def moved(self, poses: FloatArray, twists: FloatArray, version: int, stamp: Any) -> World:
+        """The same objects in other states."""
+        world = replace(self, poses=poses, twists=twists, version=version, stamp=stamp)
+        # What follows from the objects alone has been found out already.
+        for name in ("kinds", "planar", "families"):
+            if name in self.__dict__:
+                world.__dict__[name] = self.__dict__[name]
+        return world
 
     def __len__(self) -> int:
         return len(self.ids)
