@@ -40,9 +40,9 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 AnyShape = Shape | Frustum
 
-# "Size" is the larger diameter of the two shapes; "coordinates" is the sum of how far the vertices, the
-# shapes and the scene they come from reach from the origins they are given about: the largest numbers that
-# either side adds up.
+# "Size" is the larger diameter of the two shapes; "coordinates" is the sum of how far the vertices
+# and b reach from the origins they are given about: the largest numbers that either side adds up.  Where in a
+# scene the pair is does not matter: both sides see the pose of b in a.
 
 # Rounding, in units of `coordinates`.  Neither FCL's closed forms nor the check of a witness put more than
 # some thirty rounded operations between input and result, each worth half an eps, on each of the two sides.
@@ -148,7 +148,6 @@ class Rows:
     point_b: FloatArray
     normal: FloatArray
     unsupported: NDArray[np.bool_]
-    far: FloatArray  #: how far from the origin the pair was when the numbers were rounded [m]
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -177,7 +176,7 @@ def scales(rows: Rows, solids: list[tuple[Solid, Solid]]) -> Scales:
     """Tolerances of rows whose kinds are all in `PEERS`."""
     size = np.array([max(a.diameter, b.diameter) for a, b in solids])
     reach = np.array([a.reach + b.reach for a, b in solids])
-    coordinates = reach + np.linalg.norm(rows.poses[:, :3], axis=1) + rows.far
+    coordinates = reach + np.linalg.norm(rows.poses[:, :3], axis=1)
     overstates = np.array([PEERS[pair_kind(a.kind, b.kind)].overstates for a, b in solids])
     return Scales(ROUNDING * coordinates, CLOSE_CALL * size, overstates * size, JITTER * size)
 

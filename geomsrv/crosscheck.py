@@ -217,7 +217,6 @@ class CrossCheck:
                 point_b=answers.point_b[chosen],
                 normal=answers.normal[chosen],
                 unsupported=answers.status[chosen] == DistanceStatus.UNSUPPORTED,
-                far=np.zeros(len(chosen)),
             )
         )
         return len(chosen)
@@ -265,7 +264,6 @@ class CrossCheck:
                 point_b=local(answer.point_b[chosen] - origin),
                 normal=local(answer.normal[chosen]),
                 unsupported=answer.status[chosen] == DistanceStatus.UNSUPPORTED,
-                far=np.linalg.norm(origin, axis=1) + np.linalg.norm(world.poses[b, :3], axis=1),
             )
         )
         return len(chosen)

@@ -230,10 +230,24 @@ def test_lattice_boxes_give_only_explained_differences(rng):
 def test_without_witnesses_fcl_must_contradict_itself_to_be_blamed(rng):
     shapes, poses, said = lattice(rng, 1200 * SCALE)
     nothing = np.full((len(poses), 3), np.nan)
-    tally, differences = judged(shapes, poses, replace(said, point_b=nothing, _point_a=nothing, _normal=nothing))
+    said = replace(said, point_b=nothing, _point_a=nothing, _normal=nothing)
+    tally, differences = judged(shapes, poses, said)
     assert tally.explained >= 10, "the defect was not met"
     for d in differences:
         assert d.explained == ("and then agrees" in d.reason), str(d)
+    # And it must agree with us then: that FCL is wrong does not make us right.
+    wrong = replace(said, distance=said.distance + 0.1, lower=said.lower + 0.1, upper=said.upper + 0.1)
+    tally, differences = judged(shapes, poses, wrong)
+    assert tally.unexplained == len(poses), report([d for d in differences if d.explained])
+
+
+def test_an_error_smaller_than_the_nudge_is_not_explained_by_it(rng):
+    shapes, poses, said = spheres(20, rng)
+    off = 0.5 * _judge.JITTER  # of shapes of size 1
+    nothing = np.full((20, 3), np.nan)
+    said = answers(said.distance + off, nothing, nothing, nothing)
+    tally, differences = judged(shapes, poses, said)
+    assert tally.unexplained == 20, report(differences)
 
 
 TAMPERED = {
@@ -347,6 +361,10 @@ def test_the_witness_check_does_not_trust_the_answer():
     assert _witness.bracket(a, b, x, 2.0 * x, x).upper == 2.0  # 1 and 1 outside of the sphere
     assert _witness.bracket(a, b, x, 3.0 * x, -x).lower == -6.0
     assert _witness.bracket(a, b, NOWHERE, NOWHERE, NOWHERE) == (-np.inf, np.inf)
+    near = _witness.Placed.at("sphere", ball.packed, np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    assert _witness.bracket(a, near, x, 0.5 * x, x) == (-0.5, 0.0)  # the deepest points are in both
+    assert _witness.bracket(a, near, x, 2.0 * x, x).upper == 0.0  # one common point is enough
+    assert _witness.bracket(a, near, -0.5 * x, 2.0 * x, x).upper == 1.0  # 1 outside of either
 
 
 def test_hull_weights_find_points_of_hulls(rng):
@@ -604,10 +622,18 @@ def test_a_worker_that_keeps_dying_is_left_alone_for_a_while(rng, monkeypatch):
         assert check.tally().agreed == 10
 
 
-def gone(pid_or_fd, timeout_s=10.0):
-    """Whether a process ends in time; a zombie counts as ended."""
+def wait_for_the_fault(check):
+    """Until the worker has said that it is about to fail."""
+    deadline = time.monotonic() + 30.0
+    while b"about to fail" not in check._fcl._process._last_words:
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+
+
+def gone(watch, timeout_s=10.0):
+    """Whether the process of a pidfd ends in time; a zombie counts as ended."""
     poller = select.poll()
-    poller.register(pid_or_fd, select.POLLIN)
+    poller.register(watch, select.POLLIN)
     return bool(poller.poll(1000.0 * timeout_s))
 
 
@@ -621,6 +647,7 @@ def test_closing_leaves_no_process_behind(busy, rng, faulty):
     watch = os.pidfd_open(pid)
     if busy:
         check.submit(*poisoned(300, [0, 1], rng))
+        wait_for_the_fault(check)
     start = time.monotonic()
     check.close()
     check.close()
@@ -634,6 +661,25 @@ def test_closing_leaves_no_process_behind(busy, rng, faulty):
     assert check.tally().reasons == ({SkipReason.CLOSED: 300} if busy else {})
     assert check.submit(*spheres(10, rng)) == 0
     assert check.tally().reasons[SkipReason.CLOSED] == (310 if busy else 10)
+
+
+def test_closing_does_not_wait_for_a_worker_that_never_gets_ready(rng, monkeypatch):
+    check = CrossCheck("all")
+
+    class ClosedMeanwhile(_fcl_process.FclProcess):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            check._fcl.stop()
+
+    monkeypatch.setattr(_fcl_supervisor, "FclProcess", ClosedMeanwhile)
+    sleep = "import time; time.sleep(60)"
+    monkeypatch.setattr(_fcl_supervisor, "WORKER_COMMAND", (sys.executable, "-S", "-c", sleep))
+    start = time.monotonic()
+    check.submit(*spheres(10, rng))
+    assert check.drain(30.0)
+    check.close()
+    assert time.monotonic() - start < 10.0
+    assert check.tally().reasons == {SkipReason.CLOSED: 10} and check.worker_pid is None
 
 
 @pytest.mark.parametrize("busy", [False, True])
@@ -651,6 +697,7 @@ check.submit(*t.spheres(10, rng))
 assert check.drain(30.0)
 if {busy}:
     check.submit(*t.poisoned(1, [0], rng))
+    t.wait_for_the_fault(check)
 print(check.worker_pid, flush=True)
 sys.stdin.read()
 """
@@ -678,8 +725,11 @@ def test_a_fault_of_our_own_disables_the_check_and_is_reported(rng, monkeypatch,
 
 def test_more_shapes_than_the_worker_keeps(rng, monkeypatch):
     monkeypatch.setattr(_fcl_process, "MAX_SHAPES", 530)
-    tally, differences = judged(*constructed(["box-sphere", "capsule-capsule"], rng, 300))
-    assert tally.agreed == 600, tally.summary() + report(differences)
+    with CrossCheck("all") as check:
+        check.submit(*constructed(["box-sphere", "capsule-capsule"], rng, 300))
+        assert check.drain(60.0)
+        assert check.tally().agreed == 600, report(check.poll())
+        assert 0 < len(check._fcl._process._known) <= 530
 
 
 # ---------------------------------------------------------------------------------------------------- reports
@@ -769,6 +819,27 @@ def test_pairs_that_were_being_submitted_while_it_closed_are_counted_too(started
     check.submit(*spheres(300, rng))
     assert check.tally().reasons == {SkipReason.CLOSED: 300} and adds_up(check.tally())
     assert check.tally().pending == 0 and check.worker_pid is None
+
+
+def test_far_from_the_origin_fcl_is_still_told_from_us(rng):
+    """Out there witnesses are known to 1e-11 m only, which must not make us look wrong."""
+    scene = gs.Scene()
+    corner = 1e5 / 3.0
+    scene.apply(
+        gs.SceneUpdate(
+            add=[
+                gs.SceneObject(
+                    f"box {i:02d}",
+                    gs.Box(rng.choice([0.25, 0.5, 1.0], 3)),
+                    (*(corner + 0.5 * rng.integers(-12, 13, 3)), 0, 0, 0, 1),
+                )
+                for i in range(50)
+            ]
+        )
+    )
+    tally = cross_check_scene(scene)
+    assert tally.explained >= 5, tally.summary()
+    assert tally.unexplained == 0, report(tally.recent)
 
 
 def test_a_scene_that_has_moved_on_is_not_compared(rng):
