@@ -620,24 +620,24 @@ class Scene:
     def _rebuilt(self) -> World:
         old, ids = self._world, tuple(sorted(self._objects))
         objects = [self._objects[name] for name in ids]
-        distinct: dict[int, int] = {}
-        shape = np.array([distinct.setdefault(id(o.shape), len(distinct)) for o in objects], dtype=np.int64)
-        by_identity = {id(o.shape): o.shape for o in objects}
-        shapes = [by_identity[key] for key in distinct]
+        distinct = {id(o.shape): o.shape for o in objects}
+        number = {key: k for k, key in enumerate(distinct)}
+        shapes = list(distinct.values())
         same = len(shapes) == len(old.table.shapes) and all(map(operator.is_, shapes, old.table.shapes))
-        poses = np.array([o.pose for o in objects], dtype=np.float64).reshape(len(ids), 7)
-        twists = np.array([o.twist for o in objects], dtype=np.float64).reshape(len(ids), 6)
         # States that came by `set_states` are newer than what the objects were added with.
-        kept = [k for k, name in enumerate(ids) if name in old.index and name not in self._replaced]
-        source = [old.index[ids[k]] for k in kept]
-        poses[kept], twists[kept] = old.poses[source], old.twists[source]
+        source = np.array([-1 if name in self._replaced else old.index.get(name, -1) for name in ids], dtype=np.int64)
+        poses, twists = np.empty((len(ids), 7)), np.empty((len(ids), 6))
+        kept = source >= 0
+        poses[kept], twists[kept] = old.poses[source[kept]], old.twists[source[kept]]
+        for k in np.flatnonzero(~kept).tolist():
+            poses[k], twists[k] = objects[k].pose, objects[k].twist
         index = {name: k for k, name in enumerate(ids)}
         keys = [index[a] * len(ids) + index[b] for a, b in self._allowed if a in index and b in index]
         return World(
             ids=ids,
             index=index,
-            table=old.table if same else ShapeTable.of(shapes),
-            shape=shape,
+            table=old.table if same else ShapeTable.of(shapes, old.table),
+            shape=np.array([number[id(o.shape)] for o in objects], dtype=np.int64),
             uncertainty=np.array([o.uncertainty for o in objects], dtype=np.float64),
             velocity_uncertainty=np.array([o.velocity_uncertainty for o in objects], dtype=np.float64),
             motion_faults={k: o.motion_fault for k, o in enumerate(objects) if o.motion_fault},

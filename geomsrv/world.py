@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,11 +32,28 @@ from geomsrv.shapes import (
     pack,
 )
 
-__all__ = ["ROUNDOFF", "ShapeTable", "World", "gather", "supported_kinds"]
+__all__ = ["ROUNDOFF", "ShapeRow", "ShapeTable", "World", "gather", "supported_kinds"]
 
 AnyShape = Shape | Frustum
 
 ROUNDOFF = 2.0**-53  #: largest relative error of one float64 operation
+
+
+class ShapeRow(NamedTuple):
+    """What a table says of one shape."""
+
+    kind: int  #: code the engine knows it by
+    params: FloatArray  #: (4,)
+    hull: FloatArray  #: (k, 3) vertices the engine sees
+    ring: FloatArray  #: (k, 2) vertices of a polygon
+    bounds: tuple[float, ...]  #: (8,) center, half extents, rounding radius, reach
+
+    @classmethod
+    def of(cls, shape: AnyShape) -> ShapeRow:
+        """The row of a shape."""
+        packed = pack([shape])
+        ring = shape.vertices if isinstance(shape, Polygon) else np.zeros((0, 2))
+        return cls(int(packed.kinds[0]), packed.params[0], packed.vertices, ring, _bounds(shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +63,8 @@ class ShapeTable:
     Attributes
     ----------
     shapes : tuple of Shape
+    rows : tuple of ShapeRow
+        What the arrays below were made of.
     packed : PackedShapes
         As the engine reads them.
     kind_names, kind : tuple of str, (m,) int64
@@ -62,6 +81,7 @@ class ShapeTable:
     """
 
     shapes: tuple[AnyShape, ...]
+    rows: tuple[ShapeRow, ...]
     packed: PackedShapes
     kind_names: tuple[str, ...]
     kind: IntArray
@@ -76,28 +96,44 @@ class ShapeTable:
     ring_offsets: IntArray
 
     @classmethod
-    def of(cls, shapes: Iterable[AnyShape]) -> ShapeTable:
-        """Table of the given shapes, in this order."""
-        rows = tuple(shapes)
-        packed = pack(rows)
-        bounds = np.array([_bounds(shape) for shape in rows], dtype=np.float64).reshape(len(rows), 8)
-        rings = [shape.vertices if isinstance(shape, Polygon) else np.zeros((0, 2)) for shape in rows]
-        names = sorted({shape.kind for shape in rows})
+    def of(cls, shapes: Iterable[AnyShape], known: ShapeTable | None = None) -> ShapeTable:
+        """Table of the given shapes, in this order; those of a `known` table are not looked at again."""
+        listed = tuple(shapes)
+        old = {id(shape): row for shape, row in zip(known.shapes, known.rows, strict=True)} if known else {}
+        rows = tuple(old.get(id(shape)) or ShapeRow.of(shape) for shape in listed)
+        bounds = np.array([row.bounds for row in rows], dtype=np.float64).reshape(len(rows), 8)
+        names = sorted({shape.kind for shape in listed})
+        codes = {name: code for code, name in enumerate(names)}
+        kind = np.array([codes[shape.kind] for shape in listed], dtype=np.int64)
+        hulls, hull_offsets = _end_to_end([row.hull for row in rows], 3)
+        rings, ring_offsets = _end_to_end([row.ring for row in rows], 2)
         return cls(
-            shapes=rows,
-            packed=packed,
+            shapes=listed,
+            rows=rows,
+            packed=PackedShapes(
+                np.array([row.kind for row in rows], dtype=np.uint8),
+                np.array([row.params for row in rows], dtype=np.float64).reshape(len(rows), 4),
+                hulls,
+                hull_offsets,
+            ),
             kind_names=tuple(names),
-            kind=np.array([names.index(shape.kind) for shape in rows], dtype=np.int64),
-            planar=np.array([isinstance(shape, Polygon) for shape in rows], dtype=bool),
-            unbounded=np.array([isinstance(shape, HalfSpace) for shape in rows], dtype=bool),
-            boxes=np.array([isinstance(shape, Box) for shape in rows], dtype=bool),
+            kind=kind,
+            planar=kind == codes.get(Polygon.kind, -1),
+            unbounded=kind == codes.get(HalfSpace.kind, -1),
+            boxes=kind == codes.get(Box.kind, -1),
             center=np.ascontiguousarray(bounds[:, 0:3]),
             half=np.ascontiguousarray(bounds[:, 3:6]),
             round=np.ascontiguousarray(bounds[:, 6]),
             reach=np.ascontiguousarray(bounds[:, 7]),
-            ring_vertices=np.concatenate([np.zeros((0, 2)), *rings]),
-            ring_offsets=np.cumsum([0, *(len(ring) for ring in rings)], dtype=np.int64),
+            ring_vertices=rings,
+            ring_offsets=ring_offsets,
         )
+
+
+def _end_to_end(items: list[FloatArray], width: int) -> tuple[FloatArray, IntArray]:
+    """Rows of all items, and where each begins and ends."""
+    offsets = np.cumsum([0, *map(len, items)], dtype=np.int64)
+    return np.concatenate([np.zeros((0, width)), *items]), offsets
 
 
 def _bounds(shape: AnyShape) -> tuple[float, ...]:
