@@ -322,31 +322,37 @@ def test_a_wrong_answer_is_a_difference_that_nothing_explains(name, verdicts_on_
 
 def test_an_overlap_called_a_gap_is_a_difference_that_nothing_explains(rng):
     shapes, poses, said = constructed(_judge.PEERS, rng, 0, touching=5)
-    for factor in (1.0, np.nan):
-        wrong = replace(
-            said,
-            distance=said.distance + 0.1,
-            lower=said.lower + 0.1,
-            upper=said.upper + 0.1,
-            point_b=said.point_b * factor,
-        )
-        tally, differences = judged(shapes, poses, wrong)
-        assert tally.unexplained == len(poses), report([d for d in differences if d.explained])
-        assert {d.question for d in differences} == {"intersects"}
+    with CrossCheck("all") as check:
+        for factor in (1.0, np.nan):
+            wrong = replace(
+                said,
+                distance=said.distance + 0.1,
+                lower=said.lower + 0.1,
+                upper=said.upper + 0.1,
+                point_b=said.point_b * factor,
+            )
+            check.submit(shapes, poses, wrong)
+        assert check.drain(30.0)
+        differences = check.poll()
+    assert len(differences) == 2 * len(poses)
+    assert {d.question for d in differences} == {"intersects"}
+    excused = [d for d in differences if d.explained]
+    assert not excused, report(excused)
 
 
-@pytest.mark.parametrize("offset", [-1e-9, 0.0, 1e-9])
-def test_what_is_too_close_to_call_is_skipped_by_that_name(offset, rng):
-    # Ours is off by 2e-9 on the other side: no yes or no, but no evidence against anyone either.
-    for flip in (1.0, -1.0):
-        shapes, poses, said = spheres(20, rng, gap=offset)
-        wrong = flip * offset
-        said = replace(said, distance=np.full(20, wrong), lower=np.full(20, wrong), upper=np.full(20, wrong))
-        tally, differences = judged(shapes, poses, said)
-        assert not differences
-        assert tally.agreed + tally.reasons.get(SkipReason.TOO_CLOSE, 0) == 20
-        if flip * offset != offset:
-            assert tally.reasons[SkipReason.TOO_CLOSE] == 20
+def test_what_is_too_close_to_call_is_skipped_by_that_name(rng):
+    with CrossCheck("all") as check:
+        for truth in (-1e-9, 1e-9):
+            for ours in (-1e-9, 0.0, 1e-9):
+                shapes, poses, said = spheres(20, rng, gap=truth)
+                number = np.full(20, ours)
+                check.submit(shapes, poses, replace(said, distance=number, lower=number - 1e-15, upper=number + 1e-15))
+        assert check.drain(30.0)
+        assert not check.poll()
+        tally = check.tally()
+    # Wherever the two say the same, they agree: what is skipped is ours of the other sign.
+    assert tally.reasons == {SkipReason.TOO_CLOSE: 60}, tally.summary()
+    assert tally.agreed == 60
 
 
 def test_the_witness_check_does_not_trust_the_answer():
@@ -506,7 +512,6 @@ def test_the_parent_never_loads_fcl():
 FAULTS = {
     "abort": ("os.abort()", SkipReason.WORKER_DIED, "SIGABRT"),
     "segfault": ("ctypes.string_at(0)", SkipReason.WORKER_DIED, "SIGSEGV"),
-    "exit": ("os._exit(3)", SkipReason.WORKER_DIED, "exit status 3"),
     # Neither returns to the interpreter, which is what a hang inside FCL looks like.
     "hang": ("ctypes.CDLL(None).pause()", SkipReason.TIMED_OUT, "did not answer"),
     "deaf hang": (
@@ -608,6 +613,7 @@ def test_a_worker_that_keeps_dying_is_left_alone_for_a_while(rng, monkeypatch):
         assert check.drain(30.0)
         tally = check.tally()
         assert tally.reasons == {SkipReason.BACKING_OFF: 300} and adds_up(tally)
+        assert "exit status 1" in tally.last_loss
         assert tally.restarts == _fcl_supervisor.MAX_LOSSES_PER_MINUTE - 1 and "no" in tally.last_loss
         # The rest lasts; nothing is started meanwhile.
         check.submit(*spheres(10, rng))
