@@ -49,6 +49,9 @@ Gjk points_along(const Core& a, const Core& b, Vec3 normal) {
     moved.center = b.center - gap * normal;
     moved.reach = b.reach + std::abs(gap);
     Gjk found = gjk(a, moved, normal);
+    if (found.state == GjkState::stalled) {
+        found = gjk_wide(a, moved, normal);
+    }
     found.point_b = found.point_b + gap * normal;
     return found;
 }

@@ -248,6 +248,29 @@ Gjk with_points(Gjk out, const Simplex<T>& simplex) {
     return out;
 }
 
+/// Witness points of the nearest feature.  On needles and slivers weights in doubles are poor even where the
+/// length and the direction are good; then they are computed once more, from the same vertices, in
+/// double-double.
+template <class T>
+Gjk with_good_points(Gjk out, const Simplex<T>& feature, double size) {
+    out = with_points(out, feature);
+    const auto aside = [&](const Gjk& g) { return norm(g.point_b - g.point_a - g.gap * g.normal); };
+    if constexpr (std::is_same_v<T, double>) {
+        if (aside(out) > kMeetingGap * size) {
+            Simplex<DoubleDouble> wide;
+            wide.count = feature.count;
+            for (int i = 0; i < feature.count; ++i) {
+                const Vertex<double>& v = feature.vertex[i];
+                wide.vertex[i] = {v.index_a, v.index_b, v.a, v.b, exact_difference(v.b, v.a)};
+            }
+            const auto answer = Solver<DoubleDouble>(wide, size).solve();
+            const Gjk other = with_points(out, reduced(wide, answer.nearest));
+            return aside(other) < aside(out) ? other : out;
+        }
+    }
+    return out;
+}
+
 template <class T>
 Gjk run(const Core& a, const Core& b, Vec3 start) {
     using Number = Arithmetic<T>;
@@ -269,14 +292,17 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
             out.normal = Number::to_vec3(n);
         }
         if (feature.count > 0 && Number::to_double(length) - gap <= kMeetingGap * size) {
-            out = with_points(out, feature);
-            // On a sliver the weights can be worse than the length: believe the points.
-            out.state = out.length - gap <= kMeetingGap * size ? GjkState::apart : GjkState::stalled;
+            // Not an earlier direction that did as well: this one points from one nearest point to the other.
+            out.gap = gap;
+            out.normal = Number::to_vec3(n);
+            out = with_good_points(out, feature, size);
+            // What counts is the length between the points, which have their own rounding.
+            out.state = out.length - out.gap <= kMeetingGap * size ? GjkState::apart : GjkState::stalled;
             return out;
         }
         if (feature.count > 0 && Number::to_double(length) <= kContact * size) {
-            out = with_points(out, feature);
-            out.state = GjkState::contact;
+            out = with_good_points(out, feature, size);
+            out.state = out.length <= 2 * kContact * size ? GjkState::contact : GjkState::stalled;
             return out;
         }
         simplex = feature;

@@ -32,7 +32,8 @@ constexpr double kDifferenceError = 2 * kVertexError + 2 * kUnitRoundoff;
 // sqrt(2) u of the product of their lengths; the offset of the plane turns with it about the vertex it is
 // measured at.
 constexpr double kPlaneError = 6 * kUnitRoundoff;
-constexpr double kWidePlaneError = 32 * kWideRoundoff;
+// In double-double next to nothing remains but the rounding of the result.
+constexpr double kWidePlaneError = 2 * kUnitRoundoff;
 
 // A facet is looked at again in double-double if its plane is less certain than this times S.
 constexpr double kPlaneDoubt = 8 * kUnitRoundoff;
@@ -60,7 +61,6 @@ struct Facet {
     double error = 0.0;     ///< of the offset
     bool alive = true;
     bool wide = false;  ///< computed in double-double
-    bool thin = false;  ///< too thin to have a plane: `offset` is the distance of its long edge
     int seen = 0;       ///< last vertex that looked at it
 };
 
@@ -95,10 +95,6 @@ public:
                 push(f);
                 continue;
             }
-            if (facets_[at(f)].thin) {
-                best = best < 0 ? f : best;
-                break;
-            }
             const HullVertex v = furthest(facets_[at(f)].normal);
             const double support = dot(facets_[at(f)].normal, v.b) - dot(facets_[at(f)].normal, v.a);
             if (support < reach) {
@@ -109,7 +105,14 @@ public:
                 break;
             }
             if (side(facets_[at(f)], v.w) <= 0) {
-                break;  // nothing of K lies beyond this facet; the rest is its rounding
+                // Nothing of K lies beyond this facet: what is left between support and plane is its
+                // rounding.
+                if (facets_[at(f)].wide) {
+                    break;
+                }
+                facets_[at(f)] = measured_wide(facets_[at(f)]);
+                push(f);
+                continue;
             }
             grow(f, v);
         }
@@ -118,7 +121,10 @@ public:
         // Proven only if the surface winds round the origin, which the sign of the nearest facet says for
         // all.
         out.upper = inner > 0.0 ? -(inner - kDifferenceError * size_) : 0.0;
-        set_foot(facets_[at(best)], out);
+        // The direction may come from a facet of P that is no facet of K: then its plane lies inside.
+        if (reach - facets_[at(best)].offset <= kMeetingGap * size_) {
+            set_foot(facets_[at(best)], out);
+        }
         return out;
     }
 
@@ -206,8 +212,8 @@ private:
         if (!add(around, [&](Vec3 e) { return norm(e - dot(e, along) * along); })) {
             return flat(around, out);
         }
-        const Vec3 plane = cross(w(1) - first, w(2) - first);
-        const std::array<Vec3, 1> across = {normalized(plane)};
+        // Of a sliver, doubles would know no normal.
+        const std::array<Vec3, 1> across = {narrow(unit(triangle_normal(first, w(1), w(2))))};
         if (!add(across, [&](Vec3 e) { return std::abs(dot(e, across[0])); })) {
             return flat(across, out);
         }
@@ -251,49 +257,24 @@ private:
         return f;
     }
 
+    /// The same from exact products: good for any triangle that is not a line, and those do not occur.
     Facet measured_wide(Facet f) const {
         f.wide = true;
         const Vec3 p = w(f.vertex[0]);
-        const WideVec3 e = exact_difference(w(f.vertex[1]), p);
-        const WideVec3 g = exact_difference(w(f.vertex[2]), p);
-        const WideVec3 n = cross(e, g);
-        const DoubleDouble area = sqrt(dot(n, n));
-        const double lengths = norm(narrow(e)) * norm(narrow(g));
-        const double error =
-            area.hi > 0.0 ? norm(p) * (kWidePlaneError * (lengths / area.hi) + 2 * kUnitRoundoff) : size_;
-        if (error <= kPlaneDoubt * size_) {
-            f.normal = {(n.x / area).hi, (n.y / area).hi, (n.z / area).hi};
-            f.offset = (dot(n, p) / area).hi;
-            f.error = error;
-            return f;
-        }
-        return measured_thin(f);
+        const WideVec3 n = unit(triangle_normal(p, w(f.vertex[1]), w(f.vertex[2])));
+        f.normal = narrow(n);
+        f.offset = dot(n, p).hi;
+        f.error = kWidePlaneError * norm(p);
+        return f;
     }
 
-    /// A facet so thin that its plane is noise: it is no nearer than its longest edge, less its height.  On a
-    /// convex polytope that is no nearer than the facets on both sides of it.
-    Facet measured_thin(Facet f) const {
-        f.thin = true;
-        int i = 0;
-        const auto edge = [&](int k) { return w(f.vertex[(k + 1) % 3]) - w(f.vertex[k]); };
-        for (int k = 1; k < 3; ++k) {
-            i = dot(edge(k), edge(k)) > dot(edge(i), edge(i)) ? k : i;
-        }
-        const Vec3 p = w(f.vertex[i]);
-        const Vec3 e = edge(i);
-        const double squared = dot(e, e);
-        const double x = squared > 0.0 ? std::clamp(-dot(p, e) / squared, 0.0, 1.0) : 0.0;
-        const Vec3 foot = p + x * e;
-        const Vec3 other = w(f.vertex[(i + 2) % 3]) - p;
-        const double height = squared > 0.0 ? norm(other - (dot(other, e) / squared) * e) : norm(other);
-        f.offset = norm(foot);
-        f.error = height + kFlat * size_;
-        const bool outwards = side(f, {}) < 0;  // the origin is behind it
-        if (!outwards) {
-            f.offset = -f.offset;
-        }
-        f.normal = norm(foot) > 0.0 ? normalized(foot) : perpendicular(e);
-        return f;
+    /// a / |a|, brought to size 1 first: the products that a sliver's normal is made of may be tiny.
+    static WideVec3 unit(WideVec3 a) {
+        const double largest = std::max({std::abs(a.x.hi), std::abs(a.y.hi), std::abs(a.z.hi)});
+        const DoubleDouble scale{std::ldexp(1.0, -std::ilogb(largest)), 0.0};
+        a = scale * a;
+        const DoubleDouble length = sqrt(dot(a, a));
+        return {a.x / length, a.y / length, a.z / length};
     }
 
     void push(int f) {
@@ -370,9 +351,6 @@ private:
 
     /// Witness points where the origin's foot lies on the facet itself.
     void set_foot(const Facet& f, HullFacet& out) const {
-        if (f.thin) {
-            return;
-        }
         const Vec3 n = cross(w(f.vertex[1]) - w(f.vertex[0]), w(f.vertex[2]) - w(f.vertex[0]));
         const Vec3 foot = f.offset * f.normal;
         double area[3];
@@ -385,8 +363,6 @@ private:
         if (!(area[0] >= 0.0 && area[1] >= 0.0 && area[2] >= 0.0 && sum > 0.0)) {
             return;
         }
-        out.foot = true;
-        out.witness.count = 3;
         for (int k = 0; k < 3; ++k) {
             const HullVertex& v = vertices_[at(f.vertex[k])];
             const double weight = area[k] / sum;
@@ -396,6 +372,9 @@ private:
             out.point_a = out.point_a + weight * v.a;
             out.point_b = out.point_b + weight * v.b;
         }
+        out.witness.count = 3;
+        // On a sliver the weights may be noise.
+        out.foot = norm(out.point_b - out.point_a - foot) <= kMeetingGap * size_;
     }
 
     const Core& a_;

@@ -94,14 +94,26 @@ constexpr Expansion<4 * A> times(const Expansion<A>& a, DoubleDouble b) {
     return scaled(a, b.lo) + scaled(a, b.hi);
 }
 
+/// a d - b c
+constexpr Expansion<16> minor_of(DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
+    return times(expansion(a), d) + -times(expansion(b), c);
+}
+
 int exact_orientation(WideVec3 u, WideVec3 v, WideVec3 w) {
-    const auto minor = [](DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {  // a d - b c
-        return times(expansion(a), d) + -times(expansion(b), c);
-    };
-    const auto x = times(minor(u.y, u.z, v.y, v.z), w.x);
-    const auto y = times(minor(u.z, u.x, v.z, v.x), w.y);
-    const auto z = times(minor(u.x, u.y, v.x, v.y), w.z);
+    const auto x = times(minor_of(u.y, u.z, v.y, v.z), w.x);
+    const auto y = times(minor_of(u.z, u.x, v.z, v.x), w.y);
+    const auto z = times(minor_of(u.x, u.y, v.x, v.y), w.z);
     return (x + y + z).sign();
+}
+
+/// The largest parts last: adding them up from below leaves an error of 2^-105 of the sum.
+template <int A>
+constexpr DoubleDouble rounded(const Expansion<A>& a) {
+    DoubleDouble sum;
+    for (int i = 0; i < a.count; ++i) {
+        sum = sum + DoubleDouble{a.part[static_cast<std::size_t>(i)], 0.0};
+    }
+    return sum;
 }
 
 }  // namespace
@@ -131,6 +143,13 @@ int orientation_3d(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
         return 0;
     }
     return exact_orientation(exact_difference(b, a), exact_difference(c, a), exact_difference(d, a));
+}
+
+WideVec3 triangle_normal(Vec3 a, Vec3 b, Vec3 c) {
+    const WideVec3 u = exact_difference(b, a);
+    const WideVec3 v = exact_difference(c, a);
+    return {rounded(minor_of(u.y, u.z, v.y, v.z)), rounded(minor_of(u.z, u.x, v.z, v.x)),
+            rounded(minor_of(u.x, u.y, v.x, v.y))};
 }
 
 }  // namespace geomsrv

@@ -3,6 +3,7 @@
 // On which side of a plane through three points a fourth lies, decided exactly.
 #pragma once
 
+#include "geom/double_double.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -14,5 +15,9 @@ namespace geomsrv {
 /// REQUIRES: coordinates that are 0 or between 2^-300 and 2^300 in size, so that no product leaves the normal
 /// range.
 int orientation_3d(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
+
+/// (b - a) x (c - a) from exact products: every component is right to 2^-100 of itself, even where almost all
+/// of it cancels, so that a needle of a triangle still has a normal.  REQUIRES: as above.
+WideVec3 triangle_normal(Vec3 a, Vec3 b, Vec3 c);
 
 }  // namespace geomsrv

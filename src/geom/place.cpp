@@ -72,8 +72,11 @@ Rounded relative(Vec3 m, const Transform& X, const LocalFrame& frame) {
     const WideVec3 p = widen(frame.scale * m);
     const auto row = [&](int i) { return dot(p, X.rotation.row[i]); };
     const WideVec3 turned = {row(0), row(1), row(2)};
-    const double size = safe_norm(frame.scale * m) + safe_norm(t) + safe_norm(o);
-    return rounded(turned + exact_difference(t, o), size);
+    const WideVec3 sum = turned + exact_difference(t, o);
+    // A sum is off relative to its result only; the products of a rotation are off relative to themselves.
+    const double size = is_identity(X.rotation) ? safe_norm(narrow(sum))
+                                                : safe_norm(frame.scale * m) + safe_norm(t) + safe_norm(o);
+    return rounded(sum, size);
 }
 
 PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, const LocalFrame& frame) {

@@ -13,7 +13,8 @@ struct Bounds {
     double gap = 0.0;  ///< estimate from below
     double lower = 0.0;
     double upper = 0.0;
-    double slack = 0.0;  ///< S
+    double size = 0.0;   ///< S
+    double error = 0.0;  ///< of the vertices
 };
 
 /// What the direction proves, and what the points prove if they are members of the cores.
@@ -22,11 +23,13 @@ Bounds bounds_of(const Core& a, const Core& b, Vec3 normal, double length) {
     const double size = a.reach + b.reach;
     const double error = a.error + b.error;
     return {gap, gap - (kGapError * size + kGapScale * std::abs(gap) + error),
-            length + (kMemberError * size + kGapScale * length + error), size};
+            length + (kMemberError * size + kGapScale * length + error), size, error};
 }
 
-Outcome judge(double lower, double upper, double size) {
-    return upper - lower <= kPromisedWidth * size ? Outcome::ok : Outcome::not_converged;
+/// What the caller's numbers leave open is no failure to converge.
+Outcome judge(double lower, double upper, const Bounds& bounds) {
+    return upper - lower <= kPromisedWidth * bounds.size + 3 * bounds.error ? Outcome::ok
+                                                                            : Outcome::not_converged;
 }
 
 }  // namespace
@@ -42,8 +45,8 @@ CoreSeparation certify_apart(const Core& a, const Core& b, Vec3 normal, Vec3 poi
     out.point_a = point_a;
     out.point_b = point_b;
     out.normal = normal;
-    out.converged = length - bounds.gap <= kMeetingGap * bounds.slack;
-    out.outcome = judge(out.lower, out.upper, bounds.slack);
+    out.converged = length - bounds.gap <= kMeetingGap * bounds.size;
+    out.outcome = judge(out.lower, out.upper, bounds);
     return out;
 }
 
@@ -51,7 +54,8 @@ CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 poin
                             double upper) {
     const Bounds bounds = bounds_of(a, b, normal, 0.0);
     CoreSeparation out;
-    out.value = bounds.gap;
+    // The points found coincide to rounding: unless a gap is proven, touching counts as contact.
+    out.value = bounds.lower > 0.0 ? bounds.gap : std::min(bounds.gap, 0.0);
     out.lower = bounds.lower;
     out.upper = upper + (a.error + b.error);
     // The proof from above may be the better number by an ulp or two, never by more than both are worth.
@@ -59,8 +63,8 @@ CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 poin
     out.point_a = point_a;
     out.point_b = point_b;
     out.normal = normal;
-    out.converged = upper - bounds.gap <= 2 * kMeetingGap * bounds.slack;
-    out.outcome = judge(out.lower, out.upper, bounds.slack);
+    out.converged = upper - bounds.gap <= 2 * kMeetingGap * bounds.size;
+    out.outcome = judge(out.lower, out.upper, bounds);
     return out;
 }
 

@@ -21,7 +21,7 @@
 namespace geomsrv {
 
 enum class Outcome : std::uint8_t {
-    ok,             ///< the interval is no wider than kPromisedWidth * size
+    ok,             ///< the interval is as wide as rounding makes it, see kPromisedWidth
     not_converged,  ///< it is wider, but holds
     unsupported,    ///< no kernel for this pair; all numbers are NaN
 };
