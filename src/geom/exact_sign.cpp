@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "geom/two_fold.hpp"
+#include "geom/double_double.hpp"
 
 namespace geomsrv {
 
@@ -87,22 +87,22 @@ private:
     int last_ = -1;
 };
 
-// Differences are exact, products carry 7 and their difference 3 units of kTwoFoldRoundoff; the rest covers
+// Differences are exact, each product and their difference are off by at most kWideRoundoff; the rest covers
 // the bound.
-constexpr double kTwoFoldCrossError = 12.0 * kTwoFoldRoundoff;
+constexpr double kWideCrossError = 2.5 * kWideRoundoff;
 
 // Above it no part of a product that the bound counts underflows: 2^-900 * 2^-106 > 2^-1022.
-constexpr double kTwoFoldSmallest = 0x1p-900;
+constexpr double kWideSmallest = 0x1p-900;
 
 }  // namespace
 
 int sign_of_cross_beyond_filter(Vec2 from_u, Vec2 to_u, Vec2 from_v, Vec2 to_v) {
-    const TwoFold left = two_difference(to_u.x, from_u.x) * two_difference(to_v.y, from_v.y);
-    const TwoFold right = two_difference(to_u.y, from_u.y) * two_difference(to_v.x, from_v.x);
+    const DoubleDouble left = two_sum(to_u.x, -from_u.x) * two_sum(to_v.y, -from_v.y);
+    const DoubleDouble right = two_sum(to_u.y, -from_u.y) * two_sum(to_v.x, -from_v.x);
     const double magnitude = std::fabs(left.hi) + std::fabs(right.hi);
     const double value = (left - right).hi;
     // After an overflow something here is NaN, and neither comparison holds.
-    if (magnitude > kTwoFoldSmallest && std::fabs(value) > kTwoFoldCrossError * magnitude) {
+    if (magnitude > kWideSmallest && std::fabs(value) > kWideCrossError * magnitude) {
         return value > 0.0 ? 1 : -1;
     }
 

@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <cstring>
 
-// One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the processor
-// has it.  Both give the same bits, because contraction is off and a fused multiply-add is only where std::fma says so.
+// One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the
+// processor has it.  Both give the same bits, because contraction is off and a fused multiply-add is only
+// where std::fma says so.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
 #else
@@ -28,7 +29,8 @@ struct Lanes {
     Vector v;
 
     /// As stored: a double's alignment is enough.
-    using Stored __attribute__((vector_size(kCount * sizeof(double)), aligned(alignof(double)), may_alias)) = double;
+    using Stored __attribute__((vector_size(kCount * sizeof(double)), aligned(alignof(double)), may_alias)) =
+        double;
 
     Lanes() = default;
     // Written out: GCC moves the members of a defaulted copy through general registers.
@@ -38,8 +40,11 @@ struct Lanes {
         return *this;
     }
     ~Lanes() = default;
-    GEOMSRV_INLINE Lanes(double x) : v{x, x, x, x} {}                    // NOLINT: numbers are lanes
+    GEOMSRV_INLINE Lanes(double x) : v{x, x, x, x} {}  // NOLINT: numbers are lanes
     GEOMSRV_INLINE explicit Lanes(const Vector& x) : v(x) {}
+    GEOMSRV_INLINE static Lanes load(const double* from) {
+        return Lanes(Vector(*reinterpret_cast<const Stored*>(from)));
+    }
     GEOMSRV_INLINE double operator[](int i) const { return v[i]; }
     GEOMSRV_INLINE void store(double* to) const { *reinterpret_cast<Stored*>(to) = v; }
 };
@@ -62,6 +67,7 @@ GEOMSRV_INLINE Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
 GEOMSRV_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
 GEOMSRV_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
 GEOMSRV_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+GEOMSRV_INLINE Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
 GEOMSRV_INLINE LaneMask operator<(const Lanes& a, const Lanes& b) { return LaneMask(a.v < b.v); }
 GEOMSRV_INLINE LaneMask operator<=(const Lanes& a, const Lanes& b) { return LaneMask(a.v <= b.v); }
 GEOMSRV_INLINE LaneMask operator&(const LaneMask& a, const LaneMask& b) { return LaneMask(a.v & b.v); }
@@ -88,11 +94,16 @@ GEOMSRV_INLINE Real greater(const Real& a, const Real& b) {
     return select(b < a, a, b);
 }
 
-/// Whole numbers 0 to 255, one byte each: as digits to base 256 of one number they need one conversion, not four.
+GEOMSRV_INLINE double least(const Lanes& a) { return lesser(lesser(a[0], a[1]), lesser(a[2], a[3])); }
+GEOMSRV_INLINE double greatest(const Lanes& a) { return greater(greater(a[0], a[1]), greater(a[2], a[3])); }
+
+/// Whole numbers 0 to 255, one byte each: as digits to base 256 of one number they need one conversion, not
+/// four.
 GEOMSRV_INLINE void store_bytes(const Lanes& x, std::uint8_t* to) {
     static_assert(Lanes::kCount == 4 && std::endian::native == std::endian::little);
     const Lanes digits = x * Lanes(Lanes::Vector{0x1p0, 0x1p8, 0x1p16, 0x1p24});
-    const auto packed = static_cast<std::uint32_t>(static_cast<std::int64_t>((digits[0] + digits[1]) + (digits[2] + digits[3])));
+    const auto packed = static_cast<std::uint32_t>(
+        static_cast<std::int64_t>((digits[0] + digits[1]) + (digits[2] + digits[3])));
     std::memcpy(to, &packed, sizeof packed);
 }
 

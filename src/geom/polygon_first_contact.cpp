@@ -12,11 +12,11 @@
 // intervals per axis; with one-sided axes one end is enough.)  Gap and rate stay separate numbers with
 // separate errors; nothing is normalised before the outcome is known.
 //
-// Exact contact is the one case float64 data hardly ever represent: of two polygons that touch, rotated
+// Exact contact is the one case that float64 data hardly ever represent: of two polygons that touch, rotated
 // copies overlap or miss by a rounding error.  Therefore every yes/no question below - apart, approaching,
 // parallel, same place - has a slack for the rounding of the *input*, see `Slacks`, and counts as contact
-// where the slack cannot exclude it.  The time itself and its bounds do not depend on it: they come from the
-// given numbers taken literally, in double-double.
+// where the slack cannot exclude it. The time and its bounds do not depend on it: they come from the given
+// numbers taken literally, at twice the precision.
 #include "geom/polygon_first_contact.hpp"
 
 #include <algorithm>
@@ -25,14 +25,16 @@
 #include <limits>
 #include <utility>
 
+#include "geom/double_double.hpp"
 #include "geom/exact_sign.hpp"
-#include "geom/two_fold.hpp"
-#include "geom/wide.hpp"
+#include "geom/lanes.hpp"
+#include "geom/rounding.hpp"
 
 namespace geomsrv {
 
 namespace {
 
+constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -45,8 +47,8 @@ constexpr double kInputNoise = 8.0 * kRoundoff;
 constexpr double kVelocityNoise = 5.0 * kRoundoff;
 
 // No slack exceeds this part of the reach (or of the speed).  So separations, angles and overlaps that are
-// larger are always told apart, however far from the origin or however short the edges: with tips a gap is at
-// least half the distance, and 2^-42 + rounding stays below half of 2^-40 of the scene.
+// larger are always told apart, however far from the origin and however short the edges: with tips a gap is
+// at least half the distance, and 2^-42 + rounding stays below half of 2^-40 of the scene.
 constexpr double kLargestSlack = 0x1p-42;
 
 // Velocities are rescaled where they leave [2^-200, 2^200], so that products with edges stay in the range of
@@ -54,12 +56,15 @@ constexpr double kLargestSlack = 0x1p-42;
 constexpr double kSmallestSpeed = 0x1p-200;
 constexpr double kLargestSpeed = 0x1p200;
 
-/// Relative motion of b, in units of its own.
+// Error of a rate D.w relative to |Dx wx| + |Dy wy|: edge, velocity, product, sum; the rest covers the bound.
+constexpr double kRateError = 5.0 * kRoundoff;
+
+/// Motion of b relative to a, in units of its own.
 struct Motion {
-    Vec2 velocity;      ///< b's minus a's, times 2^scale_exponent
-    TwoFoldVec2 exact;  ///< the same
+    Vec2 velocity;    ///< times 2^scale_exponent
+    ExactVec2 exact;  ///< the same, unrounded
     int scale_exponent = 0;
-    double noise = 0.0;  ///< what rounding the given velocities may change
+    double noise = 0.0;  ///< what rounding of the given velocities may change
 };
 
 Motion relative_motion(Vec2 velocity_a, Vec2 velocity_b) {
@@ -69,36 +74,38 @@ Motion relative_motion(Vec2 velocity_a, Vec2 velocity_b) {
     int exponent = 0;
     double speed = largest(velocity_b - velocity_a);
     if (!(speed <= kLargestSpeed) || (speed < kSmallestSpeed && speed > 0.0)) {
+        // Components of opposite signs may differ by more than the largest double.
         if (std::isinf(speed)) {
             before = 0.25;
-        }  // components of opposite signs may differ by more than a double holds
+        }
         speed = largest(before * velocity_b - before * velocity_a);
         exponent = std::clamp(-std::ilogb(speed), -1000, 1000);
         scale = std::scalbn(1.0, exponent);
         exponent += std::ilogb(before);
     }
-    const TwoFoldVec2 exact = {
-        scaled(scale, two_difference(before * velocity_b.x, before * velocity_a.x)),
-        scaled(scale, two_difference(before * velocity_b.y, before * velocity_a.y)),
+    const auto apart = [=](double to, double from) -> DoubleDouble {
+        const DoubleDouble difference = two_sum(before * to, -(before * from));
+        return {scale * difference.hi, scale * difference.lo};
     };
+    const ExactVec2 exact = {apart(velocity_b.x, velocity_a.x), apart(velocity_b.y, velocity_a.y)};
     const double noise =
-        kVelocityNoise * scale * (before * largest(velocity_a) + before * largest(velocity_b));
+        kVelocityNoise * (scale * (before * largest(velocity_a) + before * largest(velocity_b)));
     return {{exact.x.hi, exact.y.hi}, exact, exponent, noise};
 }
 
 /// How far gaps and rates of an axis D may be off.
 ///
-/// Rounding here: see kGapError and kSpeedError.  Rounding of the input moves every vertex by up to `noise`,
+/// Rounding here: see kGapError and kRateError.  Rounding of the input moves every vertex by up to `noise`,
 /// so a gap by 2 noise |D|; and it turns an edge by up to 2 noise / |D|, which moves what is a reach away by
-/// 2 noise reach / |D|, times |D|.  A rate changes by the velocity's noise and by the same turn.  Cut at
+/// 2 noise reach / |D|, times |D|.  A rate changes by the velocity's noise and by the same turn.  All cut at
 /// kLargestSlack.
 struct Slacks {
-    double gap_rounding;
-    double gap_noise;  ///< per |D|_1 + reach
-    double gap_limit;  ///< per |D|_1
+    double gap_rounding;  ///< per |D|_1
+    double gap_noise;     ///< per |D|_1 + reach
+    double gap_limit;     ///< per |D|_1
     double reach;
     double rate_noise;  ///< per |D|_1
-    double turn_noise;  ///< absolute
+    double turn_noise;
     double rate_limit;  ///< per |D|_1
 
     Slacks(const PolygonPair& pair, const Motion& motion)
@@ -113,33 +120,25 @@ struct Slacks {
     [[nodiscard]] Slack heights() const { return {gap_noise, gap_limit}; }
 };
 
-/// Gap, rate and their errors of one axis (Real = double) or of kLanes of them; `literal` for the given
-/// numbers as they are, `gap_slack` and `rate_slack` with the rounding of the input.
+/// Gap and rate of one axis (Real = double) or of several (Lanes), and how far off they may be.
 template <class Real>
 struct AxisNumbers {
-    Real gap, rate, gap_error, rate_error, gap_slack, rate_slack;
+    Real gap, rate, gap_slack, rate_slack;
 };
 
 /// `approach` is -1 for axes of a, +1 for axes of b.
 template <class Real>
 GEOMSRV_INLINE AxisNumbers<Real> numbers(const Real& dx, const Real& dy, const Real& gap, double approach,
                                          const Motion& motion, const Slacks& slacks) {
-    const Real along_x = dx * (approach * motion.velocity.x);
-    const Real along_y = dy * (approach * motion.velocity.y);
+    const Real along_x = dx * Real(approach * motion.velocity.x);
+    const Real along_y = dy * Real(approach * motion.velocity.y);
     const Real size = magnitude(dx) + magnitude(dy);
-    const Real gap_error = slacks.gap_rounding * size + kPairUnderflow;
-    const Real rate_error =
-        (kSpeedError * kRoundoff) * (magnitude(along_x) + magnitude(along_y)) + kPairUnderflow;
-    const Real gap_noise = slacks.gap_noise * (size + slacks.reach);
-    const Real rate_noise = slacks.rate_noise * size + slacks.turn_noise;
-    const Real gap_limit = slacks.gap_limit * size;
-    const Real rate_limit = slacks.rate_limit * size;
-    return {gap,
-            along_x + along_y,
-            gap_error,
-            rate_error,
-            gap_error + smaller(gap_noise, gap_limit),
-            rate_error + smaller(rate_noise, rate_limit)};
+    const Real gap_noise =
+        lesser<Real>(slacks.gap_noise * (size + Real(slacks.reach)), slacks.gap_limit * size);
+    const Real rate_noise =
+        lesser<Real>(slacks.rate_noise * size + Real(slacks.turn_noise), slacks.rate_limit * size);
+    return {gap, along_x + along_y, slacks.gap_rounding * size + gap_noise + Real(kPairUnderflow),
+            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise + Real(kPairUnderflow)};
 }
 
 constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
@@ -147,111 +146,145 @@ constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
 AxisNumbers<double> numbers(const PolygonPair& pair, AxisOf axis, const Motion& motion,
                             const Slacks& slacks) {
     const PairedPolygon& p = pair.side(axis.side);
-    return numbers<double>(p.dx[axis.index], p.dy[axis.index], p.gap[axis.index], approach_of(axis.side),
-                           motion, slacks);
+    const std::size_t k = axis.index;
+    return numbers<double>(p.dx[k], p.dy[k], p.gap[k], approach_of(axis.side), motion, slacks);
 }
 
 /// What all axes together say, slacks included.
 struct Window {
-    double enter = 0.0;        ///< contact cannot begin earlier
-    double leave = kInfinity;  ///< nor last longer
-    bool apart = false;        ///< certainly apart along some axis now
-    bool never = false;        ///< ... and not approaching along it
-    bool deep = true;          ///< certainly overlapping along every axis now
+    double enter;  ///< contact cannot begin earlier
+    double leave;  ///< nor last longer
+    bool apart;    ///< certainly apart along some axis now
+    bool never;    ///< ... and certainly not approaching along it
+    bool deep;     ///< certainly overlapping along every axis now
 };
 
+/// Leaves for every axis in work[0..2]: the largest gap and the least rate, whose quotient is the latest
+/// entry or the earliest exit, and the largest rate.
 GEOMSRV_WIDE_CLONES Window window_of(const PolygonPair& pair, const Motion& motion, const Slacks& slacks) {
-    Lanes enter{};
-    Lanes leave = Lanes{} + kInfinity;
-    Mask apart{};
-    Mask never{};
-    Mask shallow{};
+    const Lanes zero = 0.0;
+    const Lanes never = kInfinity;
+    const LaneMask none = never < zero;
+    Lanes enter = zero;
+    Lanes leave = never;
+    LaneMask apart = none;
+    LaneMask parting = none;
+    LaneMask deep = ~none;
     for (const int i : {0, 1}) {
         const PairedPolygon& p = pair.side(i);
         for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const auto [gap, rate, gap_error, rate_error, gap_slack, rate_slack] = numbers<Lanes>(
-                load(p.dx + k), load(p.dy + k), load(p.gap + k), approach_of(i), motion, slacks);
-            const Lanes open = gap - gap_slack;       // > 0: certainly apart
-            const Lanes closing = rate + rate_slack;  // <= 0: certainly not approaching
+            const AxisNumbers<Lanes> at = numbers(Lanes::load(p.dx + k), Lanes::load(p.dy + k),
+                                                  Lanes::load(p.gap + k), approach_of(i), motion, slacks);
+            const Lanes open = at.gap - at.gap_slack;       // > 0: certainly apart
+            const Lanes closing = at.rate + at.rate_slack;  // <= 0: certainly not approaching
+            const Lanes most = at.gap + at.gap_slack;
             const Lanes time = open / closing;
-            const Mask is_apart = open > 0.0;
-            const Mask may_close = closing > 0.0;
-            apart |= is_apart;
-            never |= is_apart & ~may_close;
-            enter = larger(enter, (is_apart & may_close) ? time : Lanes{});
-            leave = smaller(leave, closing < 0.0 ? time : Lanes{} + kInfinity);
-            // Padding has no axis and must not count as shallow.
-            const Mask real = (load(p.dx + k) != 0.0) | (load(p.dy + k) != 0.0);
-            shallow |= real & ~(gap + gap_slack < 0.0);
+            const LaneMask is_apart = zero < open;
+            const LaneMask may_close = zero < closing;
+            apart = apart | is_apart;
+            parting = parting | (is_apart & ~may_close);
+            deep = deep & (most < zero);
+            enter = greater(enter, select(is_apart & may_close, time, zero));
+            leave = lesser(leave, select(closing < zero, time, never));
+            most.store(p.work[0] + k);
+            (at.rate - at.rate_slack).store(p.work[1] + k);
+            closing.store(p.work[2] + k);
         }
     }
-    return {largest(enter), smallest(leave), any(apart), any(never), !any(shallow)};
+    return {greatest(enter), least(leave), any(apart), any(parting), all(deep)};
 }
 
-/// For the given numbers as they are, per axis: work[0] is the latest possible entry, work[1] the nominal
-/// exit. Returns the earliest possible first contact; axes along which they slide within the slack have no
-/// say in it.
-GEOMSRV_WIDE_CLONES double literal_times(const PolygonPair& pair, const Motion& motion,
-                                         const Slacks& slacks) {
-    Lanes lower{};
-    const Lanes never = Lanes{} + kInfinity;
+/// How many axes `candidates_of` has listed.
+struct Candidates {
+    std::size_t entries = 0;
+    std::size_t exits = 0;
+};
+
+/// Axes that may set the first or the last contact, found without a division per axis: those along which
+/// contact may begin no earlier than `window.enter`, and those along which it may end no later than
+/// `window.leave`, which are the outermost bounds.  Mostly it is one axis each.
+GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Window& window, AxisOf* entries,
+                                             AxisOf* exits) {
+    Candidates found;
+    const Lanes zero = 0.0;
     for (const int i : {0, 1}) {
         const PairedPolygon& p = pair.side(i);
         for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const auto [gap, rate, gap_error, rate_error, gap_slack, rate_slack] = numbers<Lanes>(
-                load(p.dx + k), load(p.dy + k), load(p.gap + k), approach_of(i), motion, slacks);
-            const Lanes least = gap - gap_error;
-            const Lanes fastest = rate + rate_error;
-            const Mask sliding = (gap <= gap_slack) & (rate <= rate_slack);
-            lower = larger(lower, ((least > 0.0) & (fastest > 0.0) & ~sliding) ? least / fastest : Lanes{});
-            const Lanes most = gap + gap_error;
-            const Lanes slowest = rate - rate_error;
-            const Lanes late = slowest > 0.0 ? most / slowest : never;
-            store(p.work[0] + k, most > 0.0 ? late : Lanes{});
-            // Sliding within the slack does not end a contact.
-            store(p.work[1] + k, rate + rate_slack < 0.0 ? gap / rate : never);
+            const Lanes most = Lanes::load(p.work[0] + k);
+            const Lanes slowest = Lanes::load(p.work[1] + k);
+            const Lanes closing = Lanes::load(p.work[2] + k);
+            // most / slowest >= enter if it approaches for certain; else it may begin at any time.
+            const LaneMask begins = (zero < most) & (window.enter * slowest <= most);
+            // most / slowest <= leave, both negative.  Sliding within the slack does not end a contact.
+            const LaneMask ends = (closing < zero) & (window.leave * slowest <= most);
+            if (!any(begins | ends)) {
+                continue;
+            }
+            for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                if (begins.v[lane] != 0) {
+                    entries[found.entries++] = {i, k + lane};
+                }
+                if (ends.v[lane] != 0) {
+                    exits[found.exits++] = {i, k + lane};
+                }
+            }
         }
     }
-    return largest(lower);
+    return found;
+}
+
+/// Relative error of `quotient`: Joldes, Muller, Popescu 2017, algorithm DWDivDW2, has 15; one for the bound.
+constexpr double kQuotientError = 16.0 * 0x1p-106;
+
+DoubleDouble quotient(DoubleDouble a, DoubleDouble b) {
+    const double first = a.hi / b.hi;
+    if (!(std::fabs(first) < kInfinity)) {
+        return {first, 0.0};
+    }
+    const DoubleDouble product = two_product(first, b.hi);
+    const double rest = ((a.hi - product.hi) - product.lo) + (a.lo - first * b.lo);
+    return quick_two_sum(first, rest / b.hi);
 }
 
 /// A time and proven bounds.
 struct Timed {
-    TwoFold nominal;
+    DoubleDouble nominal;
     double lower = 0.0;
     double upper = kInfinity;
 };
 
 /// When a gap > 0 closes.
 Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
-    Timed result;
-    if (!(rate.value.hi + rate.error > 0.0)) {
+    const double slowest = rate.value.hi - rate.error;
+    const double fastest = rate.value.hi + rate.error;
+    if (!(fastest > 0.0)) {
         return {{kInfinity, 0.0}, kInfinity, kInfinity};
     }
-    result.nominal = rate.value.hi > 0.0 ? gap.value / rate.value : TwoFold{kInfinity, 0.0};
+    Timed result;
+    result.nominal = rate.value.hi > 0.0 ? quotient(gap.value, rate.value) : DoubleDouble{kInfinity, 0.0};
     const double relative = gap.error / gap.value.hi + rate.error / rate.value.hi;
-    // (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-18) below this; quotient and rounding of the bound are in the
-    // last unit.
+    // Below it (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-18).
     constexpr double kSmallRelative = 0x1p-20;
-    if (rate.value.hi > 0.0 && relative >= 0.0 && relative < kSmallRelative &&
-        result.nominal.hi < kInfinity) {
-        const double error = result.nominal.hi * ((1.0 + 0x1p-18) * relative + 20.0 * kTwoFoldRoundoff);
+    if (rate.value.hi > 0.0 && relative < kSmallRelative && result.nominal.hi < kInfinity) {
+        const double error = result.nominal.hi * ((1.0 + 0x1p-18) * relative + kQuotientError);
         result.lower = next_down(result.nominal.hi + (result.nominal.lo - error));
         result.upper = next_up(result.nominal.hi + (result.nominal.lo + error));
         return result;
     }
-    const auto quotient_down = [](double a, double b) { return next_down(next_down(a) / next_up(b)); };
-    const auto quotient_up = [](double a, double b) { return next_up(next_up(a) / next_down(b)); };
-    const double least = gap.value.hi - gap.error;
-    result.lower = least > 0.0 ? quotient_down(next_down(least), next_up(rate.value.hi + rate.error)) : 0.0;
-    const double slowest = rate.value.hi - rate.error;
-    result.upper =
-        slowest > 0.0 ? quotient_up(next_up(gap.value.hi + gap.error), next_down(slowest)) : kInfinity;
+    // The last digits of gap or rate are lost: sums and quotient rounded outwards.
+    const double least = next_down(gap.value.hi - gap.error);
+    const double most = next_up(gap.value.hi + gap.error);
+    if (least > 0.0) {
+        result.lower = next_down(next_down(least) / next_up(next_up(fastest)));
+    }
+    if (next_down(slowest) > 0.0) {
+        result.upper = next_up(next_up(most) / next_down(next_down(slowest)));
+    }
     return result;
 }
 
-Enclosed enclosed_rate(const PolygonPair& pair, AxisOf axis, const Motion& motion) {
-    Enclosed rate = enclosed_dot(pair.exact_axis(axis), motion.exact);
+Enclosed enclosed_rate(AxisOf axis, const ExactVec2& direction, const Motion& motion) {
+    Enclosed rate = enclosed_dot(direction, motion.exact);
     if (axis.side == 0) {
         rate.value = -rate.value;
     }
@@ -259,66 +292,54 @@ Enclosed enclosed_rate(const PolygonPair& pair, AxisOf axis, const Motion& motio
 }
 
 struct Entry {
-    TwoFold time{-1.0, 0.0};
+    DoubleDouble time{-1.0, 0.0};
     double lower = 0.0;
     double upper = 0.0;
     AxisOf axis;
+    std::size_t vertex = 0;  ///< of the other polygon, lowest along the axis
 };
 
 /// The axis along which contact begins last, and when, for the given numbers as they are.
 ///
 /// Axes along which the polygons slide within the slack do not set the time, but they do widen the upper
 /// bound: in exact arithmetic contact may begin only when such a tiny gap closes.
-Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& slacks) {
+Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& slacks,
+                   std::span<const AxisOf> axes) {
     Entry entry;
-    const double earliest = literal_times(pair, motion, slacks);
-    for (const int side : {0, 1}) {
-        const PairedPolygon& p = pair.side(side);
-        for (std::size_t k = 0; k < p.axes; ++k) {
-            if (!(p.work[0][k] >= earliest && p.work[0][k] > 0.0)) {
-                continue;
-            }
-            const AxisOf axis{side, k};
-            const Enclosed gap = pair.enclosed_gap(axis);
-            const bool open = gap.value.hi > gap.error;
-            if (!open && (-gap.value.hi > gap.error || pair.sign_of_gap(axis) <= 0)) {
-                continue;
-            }
-            const Timed close = closing_time(gap, enclosed_rate(pair, axis, motion));
-            const auto [g, rate, gap_error, rate_error, gap_slack, rate_slack] =
-                numbers(pair, axis, motion, slacks);
-            entry.upper = std::max(entry.upper, close.upper);
-            if (g <= gap_slack && rate <= rate_slack) {
-                continue;
-            }
-            entry.lower = std::max(entry.lower, close.lower);
-            if ((close.nominal - entry.time).hi > 0.0) {
-                entry.time = close.nominal;
-                entry.axis = axis;
-            }
+    for (const AxisOf axis : axes) {
+        const ExactVec2 direction = pair.exact_axis(axis);
+        const std::size_t vertex = pair.lowest(axis);
+        const Enclosed gap = pair.enclosed_gap(axis, direction, vertex);
+        const bool open = gap.value.hi > gap.error;
+        if (!open && (-gap.value.hi > gap.error || pair.sign_of_gap(axis, vertex) <= 0)) {
+            continue;
+        }
+        const Timed close = closing_time(gap, enclosed_rate(axis, direction, motion));
+        entry.upper = std::max(entry.upper, close.upper);
+        const AxisNumbers<double> at = numbers(pair, axis, motion, slacks);
+        const bool sliding = at.gap <= at.gap_slack && at.rate <= at.rate_slack;
+        if (sliding) {
+            continue;
+        }
+        entry.lower = std::max(entry.lower, close.lower);
+        if (entry.time < close.nominal) {
+            entry.time = close.nominal;
+            entry.axis = axis;
+            entry.vertex = vertex;
         }
     }
     return entry;
 }
 
-/// When they part; `literal_times` has been called.
-double earliest_exit(const PolygonPair& pair, const Motion& motion) {
+/// When they part.
+double earliest_exit(const PolygonPair& pair, const Motion& motion, std::span<const AxisOf> axes) {
     double exit = kInfinity;
-    AxisOf axis;
-    for (const int side : {0, 1}) {
-        const PairedPolygon& p = pair.side(side);
-        for (std::size_t k = 0; k < p.axes; ++k) {
-            if (p.work[1][k] < exit) {
-                exit = p.work[1][k];
-                axis = {side, k};
-            }
-        }
+    for (const AxisOf axis : axes) {
+        const ExactVec2 direction = pair.exact_axis(axis);
+        const Enclosed gap = pair.enclosed_gap(axis, direction, pair.lowest(axis));
+        exit = std::min(exit, quotient(gap.value, enclosed_rate(axis, direction, motion).value).hi);
     }
-    if (!(exit < kInfinity)) {
-        return kInfinity;
-    }
-    const TwoFold time = pair.enclosed_gap(axis).value / enclosed_rate(pair, axis, motion).value;
-    return std::max(time.hi, 0.0);
+    return std::max(exit, 0.0);
 }
 
 /// A vertex and where it lies along the contact line.
@@ -345,7 +366,7 @@ struct ContactMarks {
 /// A face is an edge with its collinear neighbours, or a vertex.  The ends of the common part are always
 /// vertices, of one polygon or of the other.
 ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const Slacks& slacks, AxisOf axis,
-                           double moment) {
+                           std::size_t lowest_vertex, double moment) {
     const PairedPolygon& own = pair.side(axis.side);
     const Vec2 outward_axis = own.axis(axis.index);
     const Vec2 along = {-outward_axis.y, outward_axis.x};
@@ -361,7 +382,8 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
         return first.place <= last.place ? std::pair{first, last} : std::pair{last, first};
     };
     const auto [own_low, own_high] = ends(axis.side, pair.highest(axis, slacks.heights()));
-    const auto [other_low, other_high] = ends(1 - axis.side, pair.lowest(axis, slacks.heights()));
+    const auto [other_low, other_high] =
+        ends(1 - axis.side, pair.lowest(axis, lowest_vertex, slacks.heights()));
     const Mark low = own_low.place < other_low.place ? other_low : own_low;
     const Mark high = other_high.place < own_high.place ? other_high : own_high;
 
@@ -371,31 +393,32 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
     const AxisNumbers<double> at = numbers(pair, axis, motion, slacks);
     const double time_noise =
         moment > 0.0 ? (at.gap_slack + moment * at.rate_slack) / std::max(at.rate, 0.0) : 0.0;
+    const double noise = 2.0 * slacks.gap_noise * size + std::fabs(drift) * time_noise;
     const double level =
-        2.0 * slacks.gap_rounding * size + kPairUnderflow +
-        std::min(2.0 * slacks.gap_noise * size + std::fabs(drift) * time_noise, slacks.gap_limit * size);
+        2.0 * slacks.gap_rounding * size + kPairUnderflow + std::min(noise, slacks.gap_limit * size);
     const bool segment = high.place - low.place > level;
     return axis.side == 0 ? ContactMarks{low, high, segment} : ContactMarks{high, low, segment};
 }
 
-/// Whether a ring has an inner point further from its border than the slack.
+/// Whether a ring has inner points further from its border than the slack.
 bool has_interior(const PolygonPair& pair, int side, const Slacks& slacks) {
     const PairedPolygon& p = pair.side(side);
     if (p.edges < 3) {
         return false;
     }
-    std::size_t longest = 0;
     const auto length = [&](std::size_t k) { return std::fabs(p.dx[k]) + std::fabs(p.dy[k]); };
+    std::size_t longest = 0;
     for (std::size_t k = 1; k < p.edges; ++k) {
         longest = length(k) > length(longest) ? k : longest;
     }
+    // The longest edge is at least half as long as the ring, so a flat ring has no height over it.
     double lowest = 0.0;
     for (std::size_t k = 0; k < p.edges; ++k) {
         lowest = std::min(lowest, dot(p.axis(longest), p.local(k)) - p.own[longest]);
     }
     const double size = length(longest);
     return -lowest >
-           slacks.gap_rounding * size + std::min(slacks.gap_noise * 2.0 * size, slacks.gap_limit * size);
+           slacks.gap_rounding * size + std::min(2.0 * slacks.gap_noise * size, slacks.gap_limit * size);
 }
 
 /// Unit vector, whatever the length of v; v is not zero.
@@ -419,6 +442,11 @@ struct Seconds {
 
 }  // namespace
 
+FirstContactSolver::FirstContactSolver(std::size_t largest_a, std::size_t largest_b)
+    : pair_(largest_a, largest_b),
+      entries_(PolygonPair::most_axes(largest_a, largest_b)),
+      exits_(PolygonPair::most_axes(largest_a, largest_b)) {}
+
 FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolygon& b, double t_max,
                                        bool contact_set) {
     constexpr FirstContact kNever{ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN}, {}};
@@ -426,43 +454,42 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     const Motion motion = relative_motion(a.velocity, b.velocity);
     const Slacks slacks(pair_, motion);
     const Window window = window_of(pair_, motion, slacks);
-    // Times below are in units of scaled length over scaled speed.  One later than the largest double counts
-    // as never.
-    const Seconds seconds{motion.scale_exponent - pair_.scale_exponent()};
     if (window.never || window.enter > window.leave) {
         return kNever;
     }
+    // Times are in units of scaled length over scaled speed.  One later than the largest double counts as
+    // never.
+    const Seconds seconds{motion.scale_exponent - pair_.scale_exponent()};
     if (!(seconds.nearest(window.enter) <= std::min(t_max, kLargest))) {
         return kNever;
     }
 
-    const Entry entry = window.deep ? Entry{{}, 0.0, 0.0, {}} : latest_entry(pair_, motion, slacks);
-    FirstContact result;
+    const Candidates candidates = candidates_of(pair_, window, entries_.data(), exits_.data());
+    const Entry entry = latest_entry(pair_, motion, slacks, {entries_.data(), candidates.entries});
+    const double exit = earliest_exit(pair_, motion, {exits_.data(), candidates.exits});
+
+    FirstContact result{};
     double moment = 0.0;
-    AxisOf axis;
+    AxisOf axis = entry.axis;
+    std::size_t lowest_vertex = entry.vertex;
     if (window.apart) {
         // Grazing within the slack may nominally begin after it ends, or after t_max.
         moment = std::min({entry.time.hi, window.leave, seconds.inverse(t_max)});
         if (!(moment < kInfinity)) {
             return kNever;
         }
-        axis = entry.axis;
         result.status = ContactStatus::will_touch;
         result.time = std::min(seconds.nearest(moment), t_max);
         result.time_lower = std::min(seconds.down(entry.lower), result.time);
     } else {
-        const bool solid = has_interior(pair_, 0, slacks) && has_interior(pair_, 1, slacks);
+        const bool solid = window.deep && has_interior(pair_, 0, slacks) && has_interior(pair_, 1, slacks);
+        result.status = solid ? ContactStatus::overlapping : ContactStatus::touching;
         axis = pair_.widest_gap();
-        result.status = window.deep && solid ? ContactStatus::overlapping : ContactStatus::touching;
-        result.time = 0.0;
-        result.time_lower = 0.0;
+        lowest_vertex = pair_.lowest(axis);
     }
-    const double latest = std::min(seconds.up(std::min(entry.upper, window.leave)), t_max);
-    result.time_upper = std::max(latest, result.time);
-    if (window.deep) {
-        literal_times(pair_, motion, slacks);
-    }
-    result.last_time = std::max(std::min(seconds.nearest(earliest_exit(pair_, motion)), t_max), result.time);
+    result.time_upper =
+        std::max(std::min(seconds.up(std::min(entry.upper, window.leave)), t_max), result.time);
+    result.last_time = std::max(std::min(seconds.nearest(exit), t_max), result.time);
     result.normal = {kNaN, kNaN};
     if (result.status != ContactStatus::overlapping) {
         const Vec2 outward_axis = pair_.side(axis.side).axis(axis.index);
@@ -475,21 +502,16 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         result.points = overlap_.of(pair_, slacks.heights());
         return result;
     }
-    const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
+    const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, lowest_vertex, moment);
     const auto moved = [&](const Mark& mark) {
         return pair_.side(mark.side).ring[mark.vertex] + result.time * (mark.side == 0 ? a : b).velocity;
     };
+    const bool one_vertex = marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex;
     const Vec2 low = moved(marks.low);
     const Vec2 high = moved(marks.high);
-    points_.clear();
-    if (marks.segment) {
-        points_ = {low, high};
-    } else if (marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex) {
-        points_ = {low};
-    } else {
-        points_ = {0.5 * low + 0.5 * high};
-    }
-    result.points = points_;
+    points_[0] = marks.segment || one_vertex ? low : 0.5 * low + 0.5 * high;
+    points_[1] = high;
+    result.points = {points_.data(), marks.segment ? 2U : 1U};
     return result;
 }
 

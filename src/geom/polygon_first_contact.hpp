@@ -3,6 +3,7 @@
 // When and where two translating convex polygons first touch (book section 7.7).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -41,7 +42,7 @@ struct MovingPolygon {
 /// Holds scratch memory for polygons of at most so many vertices, so that a query allocates nothing.
 class FirstContactSolver {
 public:
-    FirstContactSolver(std::size_t largest_a, std::size_t largest_b) : pair_(largest_a, largest_b) {}
+    FirstContactSolver(std::size_t largest_a, std::size_t largest_b);
 
     /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
     FirstContact solve(const MovingPolygon& a, const MovingPolygon& b, double t_max, bool contact_set);
@@ -49,7 +50,9 @@ public:
 private:
     PolygonPair pair_;
     PolygonOverlap overlap_;
-    std::vector<Vec2> points_;
+    std::vector<AxisOf> entries_;
+    std::vector<AxisOf> exits_;
+    std::array<Vec2, 2> points_;
 };
 
 }  // namespace geomsrv

@@ -16,16 +16,16 @@ Vec2 crossing(const PolygonPair& pair, int side, std::size_t vertex, AxisOf axis
     const Vec2 from = p.ring[vertex];
     const Vec2 to = p.ring[p.next(vertex)];
     const Vec2 base = pair.side(axis.side).ring[pair.side(axis.side).base(axis.index)];
-    const TwoFoldVec2 normal = pair.exact_axis(axis);
-    const TwoFold t = enclosed_dot(normal, pair.difference(base, from)).value /
-                      enclosed_dot(normal, pair.difference(to, from)).value;
+    const ExactVec2 normal = pair.exact_axis(axis);
+    const DoubleDouble t = enclosed_dot(normal, pair.difference(base, from)).value /
+                           enclosed_dot(normal, pair.difference(to, from)).value;
     const auto at = [&t](double start, double end) {
-        const TwoFold way = two_difference(end, start);
+        const DoubleDouble way = two_sum(end, -start);
         // A difference beyond the largest double: the crossing lies between the ends all the same.
         if (!std::isfinite(way.hi)) {
             return (1.0 - t.hi) * start + t.hi * end;
         }
-        return (TwoFold{start, 0.0} + t * way).hi;
+        return (DoubleDouble{start, 0.0} + t * way).hi;
     };
     return {at(from.x, to.x), at(from.y, to.y)};
 }

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "geom/exact_sign.hpp"
-#include "geom/wide.hpp"
+#include "geom/lanes.hpp"
 
 namespace geomsrv {
 
@@ -26,33 +26,77 @@ constexpr std::size_t kLargestProduct = 1024;
 // Gain of height along an edge that is certainly not rounding: two relatively exact edges, products, sum.
 constexpr double kHeightError = 6.0 * kRoundoff;
 
+constexpr std::size_t kLanes = Lanes::kCount;
+
 constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
 double largest_coordinate(Vec2 v) { return std::max(std::fabs(v.x), std::fabs(v.y)); }
 
-struct Units {
-    double before = 1.0;
-    double scale = 1.0;
+/// Four points, their coordinates apart.
+struct PointLanes {
+    Lanes x, y;
 };
 
+GEOMSRV_INLINE PointLanes load_points(const Vec2* from) {
+    const Lanes first = Lanes::load(&from->x);
+    const Lanes second = Lanes::load(&from[2].x);
+    return {Lanes(__builtin_shufflevector(first.v, second.v, 0, 2, 4, 6)),
+            Lanes(__builtin_shufflevector(first.v, second.v, 1, 3, 5, 7))};
+}
+
 /// Local coordinates of a ring; returns the largest of them.
-template <bool kScaled>
-GEOMSRV_INLINE double place_vertices(const PairedPolygon& p, Vec2 origin, Units units) {
-    double largest = 0.0;
-    for (std::size_t i = 0; i < p.ring.size(); ++i) {
-        const Vec2 v = p.ring[i];
-        double x = v.x - origin.x;
-        double y = v.y - origin.y;
-        if constexpr (kScaled) {
-            x = units.scale * (units.before * v.x - units.before * origin.x);
-            y = units.scale * (units.before * v.y - units.before * origin.y);
+GEOMSRV_INLINE double place_vertices(const PairedPolygon& p, Vec2 origin) {
+    const std::size_t n = p.ring.size();
+    const Vec2* const ring = p.ring.data();
+    if (n < kLanes) {
+        double largest_part = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            p.x[i] = ring[i].x - origin.x;
+            p.y[i] = ring[i].y - origin.y;
+            largest_part = greater(largest_part, greater(magnitude(p.x[i]), magnitude(p.y[i])));
         }
-        p.x[i] = x;
-        p.y[i] = y;
-        const double size = std::max(std::fabs(x), std::fabs(y));
-        largest = largest < size ? size : largest;
+        return largest_part;
     }
-    return largest;
+    Lanes largest_parts = 0.0;
+    const auto place = [&](std::size_t i) __attribute__((always_inline)) {
+        const PointLanes points = load_points(ring + i);
+        const Lanes x = points.x - origin.x;
+        const Lanes y = points.y - origin.y;
+        x.store(p.x + i);
+        y.store(p.y + i);
+        largest_parts = greater(largest_parts, greater(magnitude(x), magnitude(y)));
+    };
+    for (std::size_t i = 0; i + kLanes < n; i += kLanes) {
+        place(i);
+    }
+    place(n - kLanes);  // the last block may overlap the one before
+    return greatest(largest_parts);
+}
+
+/// Outward normals of the edges.
+GEOMSRV_INLINE void place_edges(const PairedPolygon& p) {
+    const std::size_t n = p.ring.size();
+    const Vec2* const ring = p.ring.data();
+    const std::size_t inner = n - 1;  // edges that need not wrap round
+    if (inner < kLanes) {
+        for (std::size_t i = 0; i < inner; ++i) {
+            p.dx[i] = ring[i + 1].y - ring[i].y;
+            p.dy[i] = ring[i].x - ring[i + 1].x;
+        }
+    } else {
+        const auto place = [&](std::size_t i) __attribute__((always_inline)) {
+            const PointLanes from = load_points(ring + i);
+            const PointLanes to = load_points(ring + i + 1);
+            (to.y - from.y).store(p.dx + i);
+            (from.x - to.x).store(p.dy + i);
+        };
+        for (std::size_t i = 0; i + kLanes < inner; i += kLanes) {
+            place(i);
+        }
+        place(inner - kLanes);
+    }
+    p.dx[inner] = ring[0].y - ring[inner].y;
+    p.dy[inner] = ring[inner].x - ring[0].x;
 }
 
 struct EdgeCheck {
@@ -66,43 +110,55 @@ constexpr bool is_tip(Vec2 edge, Vec2 next) {
     return forward < 0.0 && 4.0 * forward * forward > dot(edge, edge) * dot(next, next);
 }
 
-/// Outward normals of the edges of a ring of at least two vertices.
-template <bool kScaled>
-GEOMSRV_INLINE EdgeCheck place_edges(const PairedPolygon& p, Units units) {
+GEOMSRV_INLINE EdgeCheck check_edges(const PairedPolygon& p) {
     const std::size_t n = p.ring.size();
-    for (std::size_t i = 0; i < n; ++i) {
-        const Vec2 from = p.ring[i];
-        const Vec2 to = p.ring[i + 1 < n ? i + 1 : 0];
-        double dx = to.y - from.y;
-        double dy = from.x - to.x;
-        if constexpr (kScaled) {
-            dx = units.scale * (units.before * to.y - units.before * from.y);
-            dy = units.scale * (units.before * from.x - units.before * to.x);
-        }
-        p.dx[i] = dx;
-        p.dy[i] = dy;
-    }
     // The ring of edges goes on into the padding, so that turns need no index arithmetic.
-    for (std::size_t i = 0; i <= kLanes; ++i) {
-        p.dx[n + i] = p.dx[i % n];
-        p.dy[n + i] = p.dy[i % n];
+    for (std::size_t i = 0, wrapped = 0; i <= kLanes; ++i) {
+        p.dx[n + i] = p.dx[wrapped];
+        p.dy[n + i] = p.dy[wrapped];
+        wrapped = wrapped + 1 < n ? wrapped + 1 : 0;
     }
-    Mask flat{};
-    Mask sharp{};
+    LaneMask strict = Lanes(0.0) <= Lanes(0.0);
+    LaneMask sharp = ~strict;
     for (std::size_t i = 0; i < n; i += kLanes) {
-        const Lanes x = load(p.dx + i);
-        const Lanes y = load(p.dy + i);
-        const Lanes next_x = load(p.dx + i + 1);
-        const Lanes next_y = load(p.dy + i + 1);
+        const Lanes x = Lanes::load(p.dx + i);
+        const Lanes y = Lanes::load(p.dy + i);
+        const Lanes next_x = Lanes::load(p.dx + i + 1);
+        const Lanes next_y = Lanes::load(p.dy + i + 1);
         const Lanes left = x * next_y;
         const Lanes right = y * next_x;
         const Lanes bound = kCrossError * (magnitude(left) + magnitude(right)) + kCrossUnderflow;
-        flat |= ~(left - right > bound);  // the normals turn as the edges do
+        strict = strict & (bound < left - right);  // the normals turn as the edges do
         const Lanes forward = x * next_x + y * next_y;
-        sharp |= (forward < 0.0) &
-                 (4.0 * forward * forward > (x * x + y * y) * (next_x * next_x + next_y * next_y));
+        const Lanes lengths = (x * x + y * y) * (next_x * next_x + next_y * next_y);
+        sharp = sharp | ((forward < 0.0) & (lengths < 4.0 * forward * forward));
     }
-    return {!any(flat), any(sharp)};
+    return {all(strict), any(sharp)};
+}
+
+/// Own supports of all axes that start at their edge's first vertex.
+GEOMSRV_INLINE void place_own(const PairedPolygon& p) {
+    for (std::size_t k = 0; k < p.edges; k += kLanes) {
+        (Lanes::load(p.dx + k) * Lanes::load(p.x + k) + Lanes::load(p.dy + k) * Lanes::load(p.y + k))
+            .store(p.own + k);
+    }
+}
+
+/// As place_vertices and place_edges, for extreme coordinates.
+double place_scaled(const PairedPolygon& p, Vec2 origin, double before, double scale) {
+    double largest_part = 0.0;
+    const std::size_t n = p.ring.size();
+    const auto apart = [=](double to, double from) { return scale * (before * to - before * from); };
+    for (std::size_t i = 0; i < n; ++i) {
+        const Vec2 v = p.ring[i];
+        const Vec2 next = p.ring[p.next(i)];
+        p.x[i] = apart(v.x, origin.x);
+        p.y[i] = apart(v.y, origin.y);
+        p.dx[i] = apart(next.y, v.y);
+        p.dy[i] = apart(v.x, next.x);
+        largest_part = std::max({largest_part, std::fabs(p.x[i]), std::fabs(p.y[i])});
+    }
+    return largest_part;
 }
 
 /// Unit vector, whatever the length of v; v is not zero.
@@ -136,6 +192,7 @@ bool place_tips(PairedPolygon& p) {
     for (std::size_t k = 0; k < count; ++k) {
         p.dx[n + k] = outward_axes[k].x;
         p.dy[n + k] = outward_axes[k].y;
+        p.own[n + k] = dot(outward_axes[k], p.local(p.tip[k]));
     }
     p.axes = n + count;
     return true;
@@ -148,42 +205,41 @@ GEOMSRV_INLINE void project_all(const PairedPolygon& p, const PairedPolygon& q) 
     std::size_t k = 0;
     for (; k + 2 * kLanes <= end; k += 2 * kLanes) {
         // Two blocks at a time share the loads of the vertices.
-        const Lanes dx0 = load(p.dx + k);
-        const Lanes dy0 = load(p.dy + k);
-        const Lanes dx1 = load(p.dx + k + kLanes);
-        const Lanes dy1 = load(p.dy + k + kLanes);
+        const Lanes dx0 = Lanes::load(p.dx + k);
+        const Lanes dy0 = Lanes::load(p.dy + k);
+        const Lanes dx1 = Lanes::load(p.dx + k + kLanes);
+        const Lanes dy1 = Lanes::load(p.dy + k + kLanes);
         Lanes low0 = dx0 * q.x[0] + dy0 * q.y[0];
         Lanes low1 = dx1 * q.x[0] + dy1 * q.y[0];
         for (std::size_t j = 1; j < n; ++j) {
             const Lanes height0 = dx0 * q.x[j] + dy0 * q.y[j];
             const Lanes height1 = dx1 * q.x[j] + dy1 * q.y[j];
-            low0 = height0 < low0 ? height0 : low0;
-            low1 = height1 < low1 ? height1 : low1;
+            low0 = lesser(height0, low0);
+            low1 = lesser(height1, low1);
         }
-        store(p.gap + k, low0 - load(p.own + k));
-        store(p.gap + k + kLanes, low1 - load(p.own + k + kLanes));
+        (low0 - Lanes::load(p.own + k)).store(p.gap + k);
+        (low1 - Lanes::load(p.own + k + kLanes)).store(p.gap + k + kLanes);
     }
     for (; k < end; k += kLanes) {
-        const Lanes dx = load(p.dx + k);
-        const Lanes dy = load(p.dy + k);
+        const Lanes dx = Lanes::load(p.dx + k);
+        const Lanes dy = Lanes::load(p.dy + k);
         Lanes low = dx * q.x[0] + dy * q.y[0];
         for (std::size_t j = 1; j < n; ++j) {
             const Lanes height = dx * q.x[j] + dy * q.y[j];
-            low = height < low ? height : low;
+            low = lesser(height, low);
         }
-        store(p.gap + k, low - load(p.own + k));
+        (low - Lanes::load(p.own + k)).store(p.gap + k);
     }
 }
 
-std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
+GEOMSRV_INLINE std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
     std::size_t best = 0;
     double low = std::numeric_limits<double>::infinity();
     for (std::size_t j = 0; j < q.ring.size(); ++j) {
         const double height = dot(axis, q.local(j));
-        if (height < low) {
-            low = height;
-            best = j;
-        }
+        // Without a branch: which vertex is lowest cannot be predicted.
+        best = height < low ? j : best;
+        low = lesser(height, low);
     }
     return best;
 }
@@ -204,14 +260,22 @@ void project_by_walking(const PairedPolygon& p, const PairedPolygon& q) {
     for (std::size_t k = p.edges; k < p.axes; ++k) {
         p.gap[k] = dot(p.axis(k), q.local(lowest_vertex(q, p.axis(k)))) - p.own[k];
     }
+    std::fill(p.gap + p.axes, p.gap + padded(p.axes), -1.0);
 }
 
-GEOMSRV_WIDE_CLONES double place_vertices_of_both(const PairedPolygon& a, const PairedPolygon& b,
-                                                  Vec2 origin) {
-    return std::max(place_vertices<false>(a, origin, {}), place_vertices<false>(b, origin, {}));
+GEOMSRV_WIDE_CLONES double place_both(const PairedPolygon& a, const PairedPolygon& b, Vec2 origin) {
+    const double reach_a = place_vertices(a, origin);
+    const double reach_b = place_vertices(b, origin);
+    place_edges(a);
+    place_edges(b);
+    return greater(reach_a, reach_b);
 }
 
-GEOMSRV_WIDE_CLONES EdgeCheck place_plain_edges(const PairedPolygon& p) { return place_edges<false>(p, {}); }
+GEOMSRV_WIDE_CLONES EdgeCheck check_and_place_own(const PairedPolygon& p) {
+    const EdgeCheck check = check_edges(p);
+    place_own(p);
+    return check;
+}
 
 GEOMSRV_WIDE_CLONES void project_all_of_both(const PairedPolygon& a, const PairedPolygon& b) {
     project_all(a, b);
@@ -250,32 +314,29 @@ Chain level_chain(const PairedPolygon& q, Vec2 axis, std::size_t start, Slack sl
     const std::size_t n = q.ring.size();
     const std::size_t ahead = count_level(q, axis, start, true, slack);
     const std::size_t behind = std::min(count_level(q, axis, start, false, slack), n - 1 - ahead);
-    return {(start + n - behind) % n, (start + ahead) % n};
+    const std::size_t first = start >= behind ? start - behind : start + n - behind;
+    const std::size_t last = start + ahead;
+    return {first, last < n ? last : last - n};
 }
 
-TwoFold difference_of(double to, double from, double before, double scale) {
-    return scaled(scale, two_difference(before * to, before * from));
+DoubleDouble difference_of(double to, double from, double before, double scale) {
+    const DoubleDouble apart = two_sum(before * to, -(before * from));
+    return {scale * apart.hi, scale * apart.lo};
 }
 
 }  // namespace
-
-Enclosed enclosed_dot(TwoFoldVec2 a, TwoFoldVec2 b) {
-    const TwoFold x = a.x * b.x;
-    const TwoFold y = a.y * b.y;
-    const double size = std::fabs(x.hi) + std::fabs(y.hi);
-    return {x + y, kTwoFoldDotError * kTwoFoldRoundoff * size + kPairUnderflow};
-}
 
 PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
     // Room for the ring of edges to go on past its end, for tips, and for whole blocks of lanes.
     const std::array<std::size_t, 2> lengths = {padded(largest_a + 2 * kLanes),
                                                 padded(largest_b + 2 * kLanes)};
-    constexpr std::size_t kArrays = 8;
+    constexpr std::size_t kArrays = 9;
     storage_.resize(kArrays * (lengths[0] + lengths[1]));
     double* at = storage_.data();
     for (std::size_t side = 0; side < 2; ++side) {
         PairedPolygon& p = sides_[side];
-        for (double** array : {&p.x, &p.y, &p.dx, &p.dy, &p.own, &p.gap, &p.work[0], &p.work[1]}) {
+        for (double** array :
+             {&p.x, &p.y, &p.dx, &p.dy, &p.own, &p.gap, &p.work[0], &p.work[1], &p.work[2]}) {
             *array = at;
             at += lengths[side];
         }
@@ -297,23 +358,22 @@ bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
     before_ = 1.0;
     scale_ = 1.0;
     scale_exponent_ = 0;
-    reach_ = place_vertices_of_both(first, second, origin);
+    reach_ = place_both(first, second, origin);
     if (!(reach_ <= kLargestReach) || (reach_ < kSmallestReach && reach_ > 0.0)) {
-        const auto place_scaled = [&] {
-            const Units units{before_, scale_};
-            reach_ = std::max(place_vertices<true>(first, origin, units),
-                              place_vertices<true>(second, origin, units));
+        const auto place_again = [&] {
+            reach_ = std::max(place_scaled(first, origin, before_, scale_),
+                              place_scaled(second, origin, before_, scale_));
         };
         // Coordinates of opposite signs may differ by more than the largest double.
         if (std::isinf(reach_)) {
             before_ = 0.25;
+            place_again();
         }
-        place_scaled();
         // 2^1000 at most, to stay a double; it brings the smallest reach, 2^-1074, to 2^-74.
         const int exponent = std::clamp(-std::ilogb(reach_), -1000, 1000);
         scale_ = std::scalbn(1.0, exponent);
         scale_exponent_ = exponent + std::ilogb(before_);
-        place_scaled();
+        place_again();
     }
     magnitude_ = scale_ * (before_ * largest_coordinate(origin)) + reach_;
     if (!place_axes(first, known_strict) || !place_axes(second, known_strict)) {
@@ -340,8 +400,7 @@ bool PolygonPair::place_axes(PairedPolygon& p, bool known_strict) {
     if (n == 1) {
         return true;
     }
-    const bool plain = scale_ == 1.0 && before_ == 1.0;
-    const EdgeCheck check = plain ? place_plain_edges(p) : place_edges<true>(p, {before_, scale_});
+    const EdgeCheck check = check_and_place_own(p);
     if (n > 2 && !check.strict && !known_strict) {
         return false;
     }
@@ -351,11 +410,9 @@ bool PolygonPair::place_axes(PairedPolygon& p, bool known_strict) {
     if ((check.has_tips || n == 2) && !place_tips(p)) {
         return false;
     }
-    for (std::size_t k = 0; k < p.axes; ++k) {
-        p.own[k] = dot(p.axis(k), p.local(p.base(k)));
-    }
     for (std::size_t k = p.axes; k < padded(p.axes); ++k) {
-        p.dx[k] = p.dy[k] = p.own[k] = 0.0;
+        p.dx[k] = p.dy[k] = 0.0;
+        p.own[k] = 1.0;  // a gap of -1: overlapping whatever the motion, so padding never matters
     }
     return true;
 }
@@ -372,11 +429,11 @@ void PolygonPair::project() {
     gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kRoundoff * reach_;
 }
 
-TwoFoldVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {
+ExactVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {
     return {difference_of(to.x, from.x, before_, scale_), difference_of(to.y, from.y, before_, scale_)};
 }
 
-Chain PolygonPair::lowest(AxisOf axis, Slack slack) const {
+std::size_t PolygonPair::lowest(AxisOf axis) const {
     const Vec2 direction = side(axis.side).axis(axis.index);
     const PairedPolygon& q = other(axis.side);
     std::size_t vertex = lowest_vertex(q, direction);
@@ -387,7 +444,11 @@ Chain PolygonPair::lowest(AxisOf axis, Slack slack) const {
     for (std::size_t steps = 0; steps < q.edges && gain(direction, q, q.previous(vertex)) > 0.0; ++steps) {
         vertex = q.previous(vertex);
     }
-    return level_chain(q, direction, vertex, slack);
+    return vertex;
+}
+
+Chain PolygonPair::lowest(AxisOf axis, std::size_t vertex, Slack slack) const {
+    return level_chain(other(axis.side), side(axis.side).axis(axis.index), vertex, slack);
 }
 
 Chain PolygonPair::highest(AxisOf axis, Slack slack) const {
@@ -416,26 +477,25 @@ AxisOf PolygonPair::widest_gap() const {
     return best;
 }
 
-TwoFoldVec2 PolygonPair::exact_axis(AxisOf axis) const {
+ExactVec2 PolygonPair::exact_axis(AxisOf axis) const {
     const PairedPolygon& p = side(axis.side);
     if (axis.index >= p.edges) {
         return {{p.dx[axis.index], 0.0}, {p.dy[axis.index], 0.0}};
     }
-    const TwoFoldVec2 edge = difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
+    const ExactVec2 edge = difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
     return {edge.y, -edge.x};
 }
 
-Enclosed PolygonPair::enclosed_gap(AxisOf axis) const {
+Enclosed PolygonPair::enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t lowest_vertex) const {
     const PairedPolygon& q = other(axis.side);
-    const TwoFoldVec2 direction = exact_axis(axis);
     const Vec2 base = side(axis.side).ring[side(axis.side).base(axis.index)];
-    const Chain chain = lowest(axis, {});
+    const Chain chain = lowest(axis, lowest_vertex, {});
     Enclosed least = enclosed_dot(direction, difference(q.ring[chain.first], base));
     for (std::size_t j = chain.first; j != chain.last;) {
         j = q.next(j);
         const Enclosed gap = enclosed_dot(direction, difference(q.ring[j], base));
         const double error = std::max(gap.error, least.error);
-        if ((gap.value - least.value).hi < 0.0) {
+        if (gap.value < least.value) {
             least = gap;
         }
         least.error = error;
@@ -443,7 +503,7 @@ Enclosed PolygonPair::enclosed_gap(AxisOf axis) const {
     return least;
 }
 
-int PolygonPair::sign_of_gap(AxisOf axis) const {
+int PolygonPair::sign_of_gap(AxisOf axis, std::size_t lowest_vertex) const {
     const PairedPolygon& p = side(axis.side);
     const PairedPolygon& q = other(axis.side);
     const Vec2 base = p.ring[p.base(axis.index)];
@@ -453,7 +513,7 @@ int PolygonPair::sign_of_gap(AxisOf axis) const {
         }
         return -orientation(base, p.ring[p.next(axis.index)], q.ring[j]);
     };
-    const Chain chain = lowest(axis, {});
+    const Chain chain = lowest(axis, lowest_vertex, {});
     int least = sign_at(chain.first);
     for (std::size_t j = chain.first; j != chain.last;) {
         j = q.next(j);

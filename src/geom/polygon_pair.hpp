@@ -9,7 +9,7 @@
 //     D.x axis k of b: likewise                         gap - D.w <= 0,  gap = min over a of D.x - max over b
 //     of D.x
 //
-// An own edge is its own support, so one projection per axis does (book section 7.7.2, one-sided form).
+// An edge is its polygon's own support, so one projection per axis does (book section 7.7.2, one-sided form).
 // Normals are not normalised: no sign and no ratio of gap and speed needs it.
 //
 // Where a - b is flat or has a corner sharper than 60 degrees, edge normals alone do not bound it well: two
@@ -22,11 +22,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
+#include "geom/double_double.hpp"
+#include "geom/exact_sign.hpp"
 #include "geom/polygon.hpp"
-#include "geom/two_fold.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -41,17 +43,10 @@ inline constexpr double kGapError = 12.0;
 /// long.
 inline constexpr double kWalkError = 40.0;
 
-/// Error of a speed D.w relative to |Dx wx| + |Dy wy|, in units of kRoundoff: edge, velocity, product, sum.
-inline constexpr double kSpeedError = 5.0;
-
-/// Error of a gap or speed in double-double, relative to the same sum over its terms, in units of
-/// kTwoFoldRoundoff: differences are exact, products make 7 and their sum 3; the rest covers the bound.
-inline constexpr double kTwoFoldDotError = 12.0;
-
 /// Below 2^-1022 results are rounded to multiples of 2^-1074; no bound here counts more than 16 of them.
 inline constexpr double kPairUnderflow = 0x1p-1070;
 
-/// One polygon of a pair, as arrays of at least `axes` rounded up to a whole number of lanes.
+/// One polygon of a pair.  Arrays have room for `axes` rounded up to whole lanes.
 struct PairedPolygon {
     Ring ring;              ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
     std::size_t edges = 0;  ///< 0 for a point, 2 for a segment
@@ -59,13 +54,13 @@ struct PairedPolygon {
     std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis
     double* x = nullptr;               ///< vertices relative to the origin of the pair, times its scale
     double* y = nullptr;
-    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`
+    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`, where the gap is -1
     double* dy = nullptr;
     double* own = nullptr;          ///< own support along the axis
     double* gap = nullptr;          ///< support of the other polygon minus own
-    std::array<double*, 2> work{};  ///< for the query, one number per axis
+    std::array<double*, 3> work{};  ///< for the query
 
-    /// First of the vertices on which the axis rests: an edge's, or the tip.
+    /// First of the vertices on which the axis rests: its edge's, or the tip.
     [[nodiscard]] std::size_t base(std::size_t axis) const { return axis < edges ? axis : tip[axis - edges]; }
     [[nodiscard]] std::size_t next(std::size_t vertex) const {
         return vertex + 1 < ring.size() ? vertex + 1 : 0;
@@ -77,15 +72,30 @@ struct PairedPolygon {
     [[nodiscard]] Vec2 local(std::size_t vertex) const { return {x[vertex], y[vertex]}; }
 };
 
-struct TwoFoldVec2 {
-    TwoFold x, y;
+/// A vector of the given numbers, unrounded: the difference of two points, or an edge's normal.
+struct ExactVec2 {
+    DoubleDouble x, y;
 };
 
-/// A double-double number and how far the exact one may be from it.
+/// A number and how far the exact one may be from it.
 struct Enclosed {
-    TwoFold value;
+    DoubleDouble value;
     double error = 0.0;
 };
+
+/// Error of a dot product of exact vectors relative to the sum over its terms, in units of 2^-106: 7 for a
+/// product (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic building blocks of
+/// double-word arithmetic", 2017), 3 for a sum that takes no care of cancellation; the rest covers the bound.
+inline constexpr double kExactDotError = 12.0 * 0x1p-106;
+
+/// dot(a, b).
+inline Enclosed enclosed_dot(const ExactVec2& a, const ExactVec2& b) {
+    const DoubleDouble x = a.x * b.x;
+    const DoubleDouble y = a.y * b.y;
+    const DoubleDouble sum = two_sum(x.hi, y.hi);
+    return {quick_two_sum(sum.hi, sum.lo + (x.lo + y.lo)),
+            kExactDotError * (std::fabs(x.hi) + std::fabs(y.hi)) + kPairUnderflow};
+}
 
 /// Vertices of a ring one after another, counter-clockwise.
 struct Chain {
@@ -106,15 +116,17 @@ struct Slack {
     double limit = 0.0;
 };
 
-/// dot(a, b) in double-double.
-Enclosed enclosed_dot(TwoFoldVec2 a, TwoFoldVec2 b);
-
 class PolygonPair {
 public:
     /// Scratch memory for rings of at most so many vertices.
     PolygonPair(std::size_t largest_a, std::size_t largest_b);
 
-    /// Takes up two valid rings; they must outlive the next call.
+    /// Upper bound for the number of axes of both polygons together.
+    static constexpr std::size_t most_axes(std::size_t largest_a, std::size_t largest_b) {
+        return largest_a + largest_b + 8;
+    }
+
+    /// Takes up two valid rings; they must outlive their use.
     void load(Ring a, Ring b);
 
     [[nodiscard]] const PairedPolygon& side(int i) const { return sides_[static_cast<std::size_t>(i)]; }
@@ -130,12 +142,14 @@ public:
     [[nodiscard]] double gap_error() const { return gap_error_; }
 
     /// The exact difference of two given points, times the scale.
-    [[nodiscard]] TwoFoldVec2 difference(Vec2 to, Vec2 from) const;
+    [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const;
 
-    /// Vertices of the other polygon that are lowest along an axis, up to `slack`.  Heights are summed over
-    /// edges, which are relatively exact, so nearly parallel edges of polygons far apart are told from
-    /// parallel ones.
-    [[nodiscard]] Chain lowest(AxisOf axis, Slack slack) const;
+    /// The vertex of the other polygon that is lowest along an axis; one of them where several are level
+    /// within rounding.
+    [[nodiscard]] std::size_t lowest(AxisOf axis) const;
+    /// All that are as low as that one, up to `slack`.  Heights are summed over edges, which are relatively
+    /// exact, so that nearly parallel edges of polygons far apart are told from parallel ones.
+    [[nodiscard]] Chain lowest(AxisOf axis, std::size_t vertex, Slack slack) const;
     /// Vertices of the axis' own polygon that are highest along it, up to `slack`; among them the axis' edge.
     [[nodiscard]] Chain highest(AxisOf axis, Slack slack) const;
 
@@ -144,10 +158,10 @@ public:
     [[nodiscard]] AxisOf widest_gap() const;
 
     /// The axis itself: exact for edges, and for tips by definition.
-    [[nodiscard]] TwoFoldVec2 exact_axis(AxisOf axis) const;
-    /// Gap along an axis in double-double, and its exact sign.
-    [[nodiscard]] Enclosed enclosed_gap(AxisOf axis) const;
-    [[nodiscard]] int sign_of_gap(AxisOf axis) const;
+    [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const;
+    /// Gap along an axis to twice the precision, and its exact sign; `vertex` is what `lowest` has found.
+    [[nodiscard]] Enclosed enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const;
+    [[nodiscard]] int sign_of_gap(AxisOf axis, std::size_t vertex) const;
 
 private:
     bool place(Ring a, Ring b, bool known_strict);
