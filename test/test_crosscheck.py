@@ -502,9 +502,10 @@ def test_a_worker_that_cannot_be_started_is_reported(rng, monkeypatch):
         assert not check.available and "cannot start" in check.reason
 
 
-def test_the_parent_never_loads_fcl():
+def test_the_parent_never_loads_fcl(tmp_path):
     script = "import sys, geomsrv.crosscheck; sys.exit('fcl' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", script], timeout=60).returncode == 0
+    # Not from here: the source tree would be taken for the package.
+    assert subprocess.run([sys.executable, "-c", script], timeout=60, cwd=tmp_path).returncode == 0
 
 
 # ----------------------------------------------------------------------------------------- the worker is lost
@@ -689,7 +690,7 @@ def test_closing_does_not_wait_for_a_worker_that_never_gets_ready(rng, monkeypat
 
 
 @pytest.mark.parametrize("busy", [False, True])
-def test_the_worker_does_not_outlive_its_parent(busy, faulty):
+def test_the_worker_does_not_outlive_its_parent(busy, faulty, tmp_path):
     command = faulty(FAULTS["hang"][0])
     script = f"""
 import sys, time
@@ -707,7 +708,9 @@ if {busy}:
 print(check.worker_pid, flush=True)
 sys.stdin.read()
 """
-    parent = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    parent = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     try:
         pid = int(parent.stdout.readline())
         watch = os.pidfd_open(pid)
