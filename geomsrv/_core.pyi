@@ -86,5 +86,18 @@ def distance_pairs_stages(
     poses_ab: _F,
     penetration: bool,
 ) -> _Stages: ...
+def distance_placed(
+    kinds: _U,
+    params: _F,
+    vertices: _F,
+    offsets: _I,
+    reach: _F,
+    shape: _I,
+    poses: _F,
+    uncertainty: _F,
+    pairs: _I,
+    pose_rounding: float,
+    penetration: bool,
+) -> _Distances: ...
 def overlapping_pairs(lower: _F, upper: _F) -> _I: ...
 def overlapping_pairs_between(lower_a: _F, upper_a: _F, lower_b: _F, upper_b: _F) -> _I: ...

@@ -161,25 +161,18 @@ def distance_rows(
 
 
 def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
-    i, j = pairs[:, 0], pairs[:, 1]
-    poses_ab = relative_poses(world, pairs)
-    gap, lower, upper, point_a, point_b, normal, status = _core.distance_pairs(
-        *world.table.packed, np.ascontiguousarray(world.shape[pairs]), poses_ab, penetration
+    table = world.table
+    answer = _core.distance_placed(
+        *table.packed,
+        table.reach,
+        world.shape,
+        world.poses,
+        world.uncertainty,
+        np.ascontiguousarray(pairs),
+        RELATIVE_POSE_ROUNDING,
+        penetration,
     )
-    uncertainty = world.uncertainty[i] + world.uncertainty[j]
-    lower, upper = _widened(lower, upper, uncertainty + _pose_rounding(world, pairs, poses_ab), penetration)
-    turn, start = world.rotations[i], world.poses[i, :3]
-    return DistanceRows(
-        pairs,
-        gap,
-        lower,
-        upper,
-        np.einsum("kij,kj->ki", turn, point_a) + start,
-        np.einsum("kij,kj->ki", turn, point_b) + start,
-        np.einsum("kij,kj->ki", turn, normal),
-        status,
-        uncertainty,
-    )
+    return DistanceRows(pairs, *answer, world.uncertainty[pairs].sum(axis=1))
 
 
 def relative_poses(world: World, pairs: IntArray) -> FloatArray:
@@ -198,37 +191,6 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
             aw * bw + ax * bx + ay * by + az * bz,
         ]
     )
-
-
-def _pose_rounding(world: World, pairs: IntArray, poses_ab: FloatArray) -> FloatArray:
-    """(k,) how much the distance of a pair may have changed because its relative pose is rounded [m]."""
-    i, j = pairs[:, 0], pairs[:, 1]
-    arm = _arm(world, i, j, np.abs(poses_ab[:, :3]).sum(axis=1))
-    turned = ~(world.unrotated[i] & world.unrotated[j])
-    rounding = np.where(turned, RELATIVE_POSE_ROUNDING * arm, 0.0)
-    return rounding + _lost(world.poses[j, :3], world.poses[i, :3])
-
-
-def _lost(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(k,) length that rounding took from a - b, by rows; 0 where that is exact.
-
-    Knuth's two-sum: bodies at round numbers of metres lose nothing, and their interval shows it.
-    """
-    difference = a - b
-    taken = a - difference
-    lost: FloatArray = np.abs((a - (difference + taken)) + (taken - b)).sum(axis=1)
-    return lost
-
-
-def _arm(world: World, i: IntArray, j: IntArray, apart: FloatArray) -> FloatArray:
-    """r_a + r_b + |p_ab|: how far from the origins the rounding of a rotation is felt."""
-    reach_a, reach_b = world.table.reach[world.shape[i]], world.table.reach[world.shape[j]]
-    # Of a half space, what counts is where the other body is and how far off the boundary lies.
-    offset = np.abs(world.table.packed.params[:, 3])
-    for reach, other, rows in ((reach_a, reach_b, i), (reach_b, reach_a, j)):
-        unbounded = np.isinf(reach) & np.isfinite(other)
-        reach[unbounded] = (apart + other + offset[world.shape[rows]])[unbounded]
-    return reach_a + reach_b + apart
 
 
 def _polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:

@@ -249,11 +249,6 @@ class World:
         return _validate.rotation_matrices(self.poses[:, 3:])
 
     @cached_property
-    def unrotated(self) -> BoolArray:
-        """(n,) bool: the rotation is the identity, exactly."""
-        return ~self.poses[:, 3:6].any(axis=1)
-
-    @cached_property
     def kinds(self) -> ByteArray:
         """(n,) uint8: code of each object's kind."""
         return self.table.packed.kinds[self.shape]

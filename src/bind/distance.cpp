@@ -9,6 +9,7 @@
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/distance_table.hpp"
+#include "geom/placed_distance.hpp"
 
 namespace geomsrv::bind {
 
@@ -120,6 +121,37 @@ nb::tuple distance_pairs(const Codes& kinds, const Rows4& params, const Rows3& v
     return out.tuple();
 }
 
+template <class Sink>
+nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& vertices,
+                          const Offsets& offsets, const Values& reach, const Offsets& shape,
+                          const Rows7& poses, const Values& uncertainty, const Pairs& pairs,
+                          double pose_rounding, bool penetration) {
+    const std::size_t shapes = kinds.size();
+    const std::size_t objects = shape.size();
+    const std::size_t n = pairs.shape(0);
+    if (params.shape(0) != shapes || offsets.size() != shapes + 1 || reach.size() != shapes ||
+        poses.shape(0) != objects || uncertainty.size() != objects) {
+        throw nb::value_error("distance_placed: arrays of different length");
+    }
+    const Sink out(n);
+    {
+        const nb::gil_scoped_release unlocked;
+        const ShapeTable table{kinds.data(), params.data(), vertices.data(), offsets.data()};
+        std::vector<double> scratch(6 * longest(offsets.data(), shapes));
+        const auto placed = [&](std::int64_t row) {
+            const std::int64_t k = shape.data()[row];
+            return PlacedShape{table.shape(k), poses.data() + 7 * row, reach.data()[k],
+                               uncertainty.data()[row]};
+        };
+        for (std::size_t i = 0; i < n; ++i) {
+            const std::int64_t* pair = pairs.data() + 2 * i;
+            out.set(i, placed_distance(placed(pair[0]), placed(pair[1]), pose_rounding, penetration,
+                                       scratch.data()));
+        }
+    }
+    return out.tuple();
+}
+
 Vec3 vec3_at(const double* row) { return {row[0], row[1], row[2]}; }
 
 template <class Sink>
@@ -212,6 +244,11 @@ void define_distance(nb::module_& m) {
            nb::arg("kinds").noconvert(), nb::arg("params").noconvert(), nb::arg("vertices").noconvert(),
            nb::arg("offsets").noconvert(), nb::arg("pairs").noconvert(), nb::arg("poses_ab").noconvert(),
            nb::arg("penetration"));
+    m.def("distance_placed", distance_placed<Answers>, nb::arg("kinds").noconvert(),
+          nb::arg("params").noconvert(), nb::arg("vertices").noconvert(), nb::arg("offsets").noconvert(),
+          nb::arg("reach").noconvert(), nb::arg("shape").noconvert(), nb::arg("poses").noconvert(),
+          nb::arg("uncertainty").noconvert(), nb::arg("pairs").noconvert(), nb::arg("pose_rounding"),
+          nb::arg("penetration"));
     define(m, "distance_boxes", "distance_boxes_stages", distance_boxes<Answers>, distance_boxes<Stages>,
            nb::arg("center_a").noconvert(), nb::arg("axes_a").noconvert(),
            nb::arg("half_extents_a").noconvert(), nb::arg("center_b").noconvert(),

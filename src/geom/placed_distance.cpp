@@ -1,0 +1,76 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/placed_distance.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace geomsrv {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool unrotated(const double* pose) { return pose[3] == 0.0 && pose[4] == 0.0 && pose[5] == 0.0; }
+
+/// What rounding took from the difference a - b; exact (Knuth's two-sum).
+double lost(double a, double b) {
+    const double difference = a - b;
+    const double taken = a - difference;
+    return std::fabs((a - (difference + taken)) + (taken - b));
+}
+
+/// Pose of b in a: the position turned into the axes of a, and conj(q_a) q_b.
+Transform relative_pose(const double* a, const Mat3& rotation_a, const double* b) {
+    const Vec3 step{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const double ax = a[3], ay = a[4], az = a[5], aw = a[6];
+    const double bx = b[3], by = b[4], bz = b[5], bw = b[6];
+    return {rotation_of(aw * bx - ax * bw - ay * bz + az * by, aw * by + ax * bz - ay * bw - az * bx,
+                        aw * bz - ax * by + ay * bx - az * bw, aw * bw + ax * bx + ay * by + az * bz),
+            transposed_times(rotation_a, step)};
+}
+
+/// How far from the origins the rounding of a rotation is felt: r_a + r_b + |p_ab|.  Of a half space, what
+/// counts is where the other body is and how far off the boundary lies.
+double arm(const PlacedShape& a, const PlacedShape& b, double apart) {
+    const auto bounded = [apart](const PlacedShape& shape, double other) {
+        const bool fits = std::isinf(shape.reach) && std::isfinite(other);
+        return fits ? apart + other + std::fabs(shape.shape.params[3]) : shape.reach;
+    };
+    return bounded(a, b.reach) + bounded(b, a.reach) + apart;
+}
+
+}  // namespace
+
+Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double pose_rounding, bool penetration,
+                           double* scratch) {
+    const Transform X_a = pose_of(a.pose);
+    const Transform X_ab = relative_pose(a.pose, X_a.rotation, b.pose);
+    Separation s = shape_distance(a.shape, b.shape, X_ab, penetration, scratch);
+    if (s.outcome == Outcome::unsupported) {
+        return s;
+    }
+    // Bodies at round numbers of metres lose nothing, and neither do bodies that are not turned; their
+    // interval shows it.
+    double slack = a.uncertainty + b.uncertainty;
+    if (!(unrotated(a.pose) && unrotated(b.pose))) {
+        const Vec3 p = X_ab.translation;
+        slack += pose_rounding * arm(a, b, std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z));
+    }
+    for (int k = 0; k < 3; ++k) {
+        slack += lost(b.pose[k], a.pose[k]);
+    }
+    if (slack > 0.0) {
+        s.lower = std::nextafter(s.lower - slack, -kInfinity);
+        s.upper = std::nextafter(s.upper + slack, kInfinity);
+    }
+    if (!penetration && s.lower < 0.0) {
+        s.lower = 0.0;
+    }
+    s.point_a = X_a * s.point_a;
+    s.point_b = X_a * s.point_b;
+    s.normal = X_a.rotation * s.normal;
+    return s;
+}
+
+}  // namespace geomsrv
