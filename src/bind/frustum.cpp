@@ -42,10 +42,14 @@ struct BoxRows {
     }
 };
 
-struct Points3 {
-    Lanes at[3];
-    GEOMSRV_INLINE explicit Points3(const double* p) {
-        for (int k = 0; k < 3; ++k) at[k] = Lanes(Lanes::Vector{p[k], p[k + 3], p[k + 6], p[k + 9]});
+/// Four rows of an array, coordinate by coordinate.
+template <std::size_t Dimension>
+struct FourRows {
+    Lanes at[Dimension];
+    GEOMSRV_INLINE explicit FourRows(const double* p) {
+        for (std::size_t k = 0; k < Dimension; ++k) {
+            at[k] = Lanes(Lanes::Vector{p[k], p[k + Dimension], p[k + 2 * Dimension], p[k + 3 * Dimension]});
+        }
     }
 };
 
@@ -64,7 +68,7 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
         std::size_t left = 0;
         std::size_t first = begin;
         for (; first + Lanes::kCount <= end; first += Lanes::kCount) {
-            const Lanes found = classify_by_sphere(planes, Points3(boxes.center + 3 * first).at, Points3(boxes.half_extents + 3 * first).at);
+            const Lanes found = classify_by_sphere(planes, FourRows<3>(boxes.center + 3 * first).at, FourRows<3>(boxes.half_extents + 3 * first).at);
             store_bytes(found, state + first);
             for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
                 undecided[left] = first + lane;
@@ -133,24 +137,20 @@ struct PointAnswers {
 template <class Kinds, bool Skewed, int Sides>
 GEOMSRV_WIDE_CLONES void measure_points(const DistanceFrame<Lanes, Sides>& frame, const View<Sides>& view,
                                         const double* points, std::size_t count, PointAnswers out) {
-    constexpr int kDimension = Sides + 1;
+    constexpr std::size_t kDimension = Sides + 1;
     std::optional<DistanceFrame<long double, Sides>> wide;
     for (std::size_t i = 0; i + Lanes::kCount <= count; i += Lanes::kCount) {
-        const double* const p = points + kDimension * i;
-        Lanes point[kDimension];
-        for (int k = 0; k < kDimension; ++k) {
-            point[k] = Lanes(Lanes::Vector{p[k], p[k + kDimension], p[k + 2 * kDimension], p[k + 3 * kDimension]});
-        }
-        const auto found = distance_to_frustum<Kinds, Skewed>(frame, point);
+        const FourRows<kDimension> point(points + kDimension * i);
+        const auto found = distance_to_frustum<Kinds, Skewed>(frame, point.at);
         found.distance.store(out.distance + i);
         found.lower.store(out.lower + i);
         found.upper.store(out.upper + i);
         store_bytes(found.region, out.region + i);
         if (out.nearest != nullptr) {
-            const auto nearest = nearest_in_world(frame, point, found);
-            for (int lane = 0; lane < Lanes::kCount; ++lane) {
-                for (int k = 0; k < kDimension; ++k) {
-                    out.nearest[kDimension * (i + static_cast<std::size_t>(lane)) + static_cast<std::size_t>(k)] = nearest.at[k][lane];
+            const auto nearest = nearest_in_world(frame, point.at, found);
+            for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
+                for (std::size_t k = 0; k < kDimension; ++k) {
+                    out.nearest[kDimension * (i + lane) + k] = nearest.at[k][static_cast<int>(lane)];
                 }
             }
         }

@@ -12,13 +12,11 @@
 #include <cstdint>
 
 #include "geom/double_double.hpp"
+#include "geom/rounding.hpp"
 #include "geom/shape.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
-
-/// Unit roundoff u of a double: |fl(x) - x| <= u |x|.
-inline constexpr double kUnitRoundoff = 0x1p-53;
 
 /// A convex polytope: center + all sums of +-generators (point, segment, box), or center + the hull of listed
 /// points.

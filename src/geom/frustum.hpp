@@ -14,12 +14,10 @@
 #include <utility>
 
 #include "geom/lanes.hpp"
+#include "geom/rounding.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
-
-/// Unit roundoff of double, 2^-53: |fl(x op y) - x op y| <= u |x op y|.
-inline constexpr double kUnitRoundoff = 0x1p-53;
 
 struct Frustum {
     Vec3 origin;                    ///< apex E [m], world frame

@@ -44,8 +44,7 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
     const auto dual = dual_basis<Real>(view.axes);
     const auto defect = gram_defect<Real>(view.axes);
     Real low[Sides], high[Sides], mirror[Sides + 1];
-    bool off_centre = false, around = false;
-    Real widest = 1.0;  // 1 + sum of squares of the steepest slopes
+    bool all_centred = true;
     for (int i = 0; i < Sides; ++i) {
         // A window beyond the axis is mirrored to the positive side, if need be.
         const bool mirrored = view.high[i] < 0.0;
@@ -55,8 +54,7 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
         frame.window[i] = low[i] > 0.0         ? Window::beyond
                           : low[i] == -high[i] ? Window::centred
                                                : Window::around;
-        off_centre |= frame.window[i] == Window::beyond;
-        around |= frame.window[i] != Window::centred;
+        all_centred &= frame.window[i] == Window::centred;
         const Real left_code = i == 0 ? 1.0 : 3.0, right_code = 2.0 * left_code;
         frame.high_code[i] = mirrored ? right_code : left_code;
         frame.low_code[i] = mirrored ? left_code : right_code;
@@ -66,8 +64,6 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
         frame.high_slope[i] = high[i] / scaled_near;
         frame.low_room[i] = 1 / (std::fabs(low[i]) + scaled_near);
         frame.high_room[i] = 1 / (std::fabs(high[i]) + scaled_near);
-        const Real steepest = std::max(std::fabs(low[i]), std::fabs(high[i])) / scaled_near;
-        widest += steepest * steepest;
     }
     mirror[Sides] = 1.0;
     frame.view = scaled_near;
@@ -90,14 +86,12 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
         remaining *= norm;
         ++frame.refinements;
     }
-    const Real projection_error = off_centre ? 32 + 12 * std::sqrt(widest) : Real(48.0);
-    frame.error_per_length = projection_error * Real(kUnitRoundoff);
-    frame.relative_error = Real(8.0 * kUnitRoundoff + 2.0 * remaining);
+    frame.relative_error = Real(kDistanceError + 2.0 * remaining);
 
     // Roots in the order in which `project` counts them: S of side 0 fastest, then S of side 1; T likewise within.
     int min_count[2] = {1, 1}, max_count[2] = {1, 1};
     for (int i = 0; i < Sides; ++i) {
-        if (around && frame.window[i] == Window::centred) frame.window[i] = Window::around;  // see with_windows
+        if (!all_centred && frame.window[i] == Window::centred) frame.window[i] = Window::around;  // see with_windows
         min_count[i] = min_choices(frame.window[i]);
         max_count[i] = max_choices(frame.window[i]);
     }

@@ -82,7 +82,7 @@ struct DistanceFrame {
     Number near, far;
     Root roots[kMaxRoots];
     Number low_code[Sides], high_code[Sides];  ///< what being beyond low, high adds to the region
-    Number error_per_length, relative_error;   ///< of a distance
+    Number relative_error;  ///< of a distance; see kLowerError for the rest
     Window window[Sides];
     int refinements = 0;  ///< projections needed after the first, see `distance_to_frustum`
 };
@@ -163,13 +163,13 @@ GEOMSRV_INLINE Projection<Number, Sides> project(const DistanceFrame<Number, Sid
     Projection<Number, Sides> found;
     const Number depth = lesser(greater(root, near), far);
     found.nearest.at[Sides] = depth;
-    found.region = select(root < near, Number(9.0), select(far < root, Number(18.0), none));
+    found.region = select(root <= near, Number(9.0), select(far <= root, Number(18.0), none));
     for (int i = 0; i < Sides; ++i) {
         const Number high = frame.high_slope[i] * depth;
         const Number low = Kinds::kKind[i] == Window::centred ? -high : frame.low_slope[i] * depth;
         found.nearest.at[i] = lesser(greater(p.at[i], low), high);
-        found.region = found.region + select(p.at[i] < low, frame.low_code[i],
-                                             select(high < p.at[i], frame.high_code[i], none));
+        found.region = found.region + select(p.at[i] <= low, frame.low_code[i],
+                                             select(high <= p.at[i], frame.high_code[i], none));
     }
     return found;
 }
@@ -187,7 +187,30 @@ struct NearestPoint {
     Mask<Number> in_range;              ///< nothing overflowed or underflowed; only of interest for Lanes
 };
 
-/// A point is proven to be inside if the room exceeds this times the reach.
+// Errors of a distance, in units u of roundoff; c is the point in frustum coordinates, |c| its length, at most the reach
+// |c_0| + |c_1| + |c_2|; d the distance.
+//
+// 1. Coordinates: 13 u sum |dual| |P - E| each (9 dual basis, 1 difference, 1 product, 2 sums); as a vector at most
+//    13 sqrt(3) 1.04 u |c| <= 23.4 u |c|.
+// 2. Depth: a root r = (z + sum k x) / (1 + sum k^2) is off by at most 11 u of the sum of magnitudes of its terms (8 in
+//    the coefficients, 1 product, 2 sums), and a shift of c by 11 u |c| along its gradient undoes that.  The depth found is
+//    the max over S min over T of such roots, hence the exact one for a point c' near c: where the slopes that are active
+//    at that depth are those of S, T the shift does it; where one becomes inactive on the way, its coordinate stays at the
+//    border and the others go on.  Each side coordinate moves by at most 11 u |c|, and so do the rest together:
+//    |c' - c| <= 11 sqrt(3) u |c| <= 19.1 u |c|.  Projection does not expand, so the point found at that depth is within
+//    2 * 19.1 u |c| of the nearest one.
+// 3. Its side coordinates are rounded by 2 u each (slope, product), at most 2 u (|c| + d).
+// 4. Differences, squares, sum, root: 4 u d.
+//
+// The point found is a point of the frustum but for 3, so above only 1, 3 and 4 count: 26 u |c| + 6 u d; below all of them:
+// 64 u |c| + 6 u d.  Axes off orthonormal enlarge part 2 and 3 by 1.05 and part 4 by 1 u.  Rounded up for second-order
+// terms and the rounding of the bounds.
+inline constexpr double kUpperError = 32.0 * kUnitRoundoff;
+inline constexpr double kLowerError = 72.0 * kUnitRoundoff;
+inline constexpr double kDistanceError = 8.0 * kUnitRoundoff;
+
+// A point is proven inside if its room exceeds the error of the room: 14 u |c| in each coordinate, 2 u in the products, so
+// (|k| + 1) 16 u |c| before scaling by 1 / (|k| + 1), which adds 3 u.
 inline constexpr double kRoomError = 20.0 * kUnitRoundoff;
 
 /// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not count.
@@ -224,12 +247,13 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
     }
     const Mask<Number> inside = none <= room;
     const Number distance = select(inside, none, square_root(square));
-    const Number error = reach * frame.error_per_length + distance * frame.relative_error;
-    const Number lower = greater(distance - error, none);
-    const Number upper = select(reach * Number(kRoomError) < room, none, distance + error);
+    const Number slack = distance * frame.relative_error;
+    const Number lower = greater(distance - (reach * Number(kLowerError) + slack), none);
+    const Number upper =
+        select(reach * Number(kRoomError) < room, none, distance + (reach * Number(kUpperError) + slack));
     const Number square_if_outside = select(inside, Number(1.0), square);
     const Mask<Number> in_range = (Number(kMinSquare) < square_if_outside) & (square_if_outside < Number(kMaxSquare));
-    return {distance, lower, upper, select(inside, none, region), offset, inside, in_range};
+    return {distance, lower, upper, select(distance <= none, none, region), offset, inside, in_range};
 }
 
 template <class Kinds, bool Skewed, class Number, int Sides>

@@ -1,6 +1,6 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-// Neighbouring doubles, to turn rounded results into bounds.  No algorithm lives here.
+// The unit roundoff and neighbouring doubles, to turn rounded results into bounds.  No algorithm lives here.
 #pragma once
 
 #include <bit>
@@ -8,6 +8,9 @@
 #include <cstdint>
 
 namespace geomsrv {
+
+/// Unit roundoff u of double: |fl(x op y) - x op y| <= u |x op y|, unless the result underflows.
+inline constexpr double kUnitRoundoff = 0x1p-53;
 
 /// The next double towards +infinity, in a few instructions where std::nextafter is a library call.  x must
 /// not be NaN; +infinity stays.
