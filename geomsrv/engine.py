@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from geomsrv.answers import Distances, DistanceStatus
 from geomsrv.config import Config
 from geomsrv.crosscheck import CrossCheck
-from geomsrv.pairwise import ListedDistances, relative_poses
+from geomsrv.narrow_phase import relative_poses
+from geomsrv.pairwise import ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
 from geomsrv.world import World
@@ -224,7 +225,8 @@ class Engine:
 
     def _contacts(self, on: frozenset[str]) -> SceneContacts:
         self.counters["contact"] += 1
-        horizon = self.config.horizon if "first_contact" in on else 0.0
+        # If nothing moves the scene sweeps nothing, and the present holds until the horizon.
+        horizon = self.config.horizon if self.config.effects_first_contact else 0.0
         self.counters["first_contact"] += "first_contact" in on
         pairs = self.scene.first_contacts(horizon, accuracy=self.config.accuracy)
         if "contact_set" in on:

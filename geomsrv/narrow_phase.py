@@ -19,7 +19,15 @@ from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
 from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 
-__all__ = ["ContactRows", "DistanceRows", "distance_rows", "first_contact_rows", "relative_poses"]
+__all__ = [
+    "ContactRows",
+    "DistanceRows",
+    "distance_rows",
+    "first_contact_rows",
+    "polygon_distances",
+    "relative_poses",
+    "solid_distances",
+]
 
 # How much the rounded relative pose may move one body against the other, in terms of r_a + r_b + |p_ab|, r
 # the reach of a body from its origin.  With u = 2^-53 and Q the exact rotation of a unit quaternion that is
@@ -80,6 +88,8 @@ class Unsupported(_Rows):
     @classmethod
     def of_kinds(cls, world: World, pairs: IntArray, text: str) -> Unsupported:
         """With a reason that names the kinds where `text` has a placeholder."""
+        if len(pairs) == 0:
+            return cls.none()
         names, which = world.pair_kinds(pairs)
         return cls(pairs, np.array([text.format(name) for name in names], dtype=object)[which])
 
@@ -146,7 +156,7 @@ def distance_rows(
     kinds = world.kinds[solids]
     answered = supported_kinds()[kinds[:, 0], kinds[:, 1]]
     parts = [DistanceRows.none()]
-    for part, kernel in ((solids[answered], _solid_distances), (polygons, _polygon_distances)):
+    for part, kernel in ((solids[answered], solid_distances), (polygons, polygon_distances)):
         if len(part):
             count_kinds(world, part, counts)
             parts.append(kernel(world, part, penetration))
@@ -160,7 +170,8 @@ def distance_rows(
     return rows, Unsupported.joined(missing)
 
 
-def _solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+def solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+    """Distances of solids, in any order; pairs without a kernel keep their rows."""
     table = world.table
     answer = _core.distance_placed(
         *table.packed,
@@ -193,7 +204,8 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
     )
 
 
-def _polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+def polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+    """Distances of polygons, in any order."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
     gap, lower, upper, point_a, point_b, normal, status = _core.distance_polygons(*rings, penetration)
     uncertainty = world.uncertainty[pairs].sum(axis=1)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from geomsrv import _validate
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.errors import GeometryError
-from geomsrv.narrow_phase import Unsupported, distance_rows, first_contact_rows
+from geomsrv.narrow_phase import (
+    NO_DISTANCE,
+    DistanceRows,
+    Unsupported,
+    count_kinds,
+    first_contact_rows,
+    polygon_distances,
+    solid_distances,
+)
 from geomsrv.placement import laid_flat
 from geomsrv.shapes import Frustum, Polygon, Shape
 from geomsrv.world import ShapeTable, World
@@ -26,9 +34,10 @@ __all__ = [
     "ListedDistances",
     "listed_distances",
     "listed_first_contacts",
-    "relative_poses",
     "world_of",
 ]
+
+NOT_COMPARED = "polygons are compared with polygons only"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,47 +138,65 @@ def world_of(shapes: Sequence[Shape | Frustum], poses: FloatArray, twists: Float
     )
 
 
-def relative_poses(world: World, pairs: IntArray) -> FloatArray:
-    """(n, 7): pose of the second object in the first, for (n, 2) rows of `world`."""
-    i, j = pairs[:, 0], pairs[:, 1]
-    step = world.poses[j, :3] - world.poses[i, :3]
-    ax, ay, az, aw = world.poses[i, 3:].T
-    bx, by, bz, bw = world.poses[j, 3:].T
-    # conj(a) b
-    return np.column_stack(
-        [
-            np.einsum("kji,kj->ki", world.rotations[i], step),
-            aw * bx - ax * bw - ay * bz + az * by,
-            aw * by + ax * bz - ay * bw - az * bx,
-            aw * bz - ax * by + ay * bx - az * bw,
-            aw * bw + ax * bx + ay * by + az * bz,
-        ]
-    )
-
-
 def listed_distances(
     world: World, pairs: IntArray, *, want: Sequence[str] = ("distance",), accuracy: str = "float64"
 ) -> ListedDistances:
     """Distances of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
     tier = _validate.accuracy(accuracy)
-    effects = _validate.want(want, ("distance", "witness", "penetration"))
-    listed = _Listed(world, pairs)
-    rows, unsupported = distance_rows(world, listed.comparable, "penetration" in effects, counts)
-    at = listed.rows_among(rows.pairs)
-    swapped = listed.swapped[:, None]
-    point_a, point_b, normal = (_take(column, at, np.nan) for column in (rows.point_a, rows.point_b, rows.normal))
+    penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
+    _distinct(world, pairs)
+    planar = world.planar[pairs]
+    # Most lists are all of one kind, and then no row needs to be moved.
+    if not planar.any():
+        rows = solid_distances(world, pairs, penetration)
+    elif planar.all():
+        rows = polygon_distances(world, pairs, penetration)
+    else:
+        rows = _mixed_distances(world, pairs, planar, penetration)
+    unsupported = rows.status == DistanceStatus.UNSUPPORTED
+    if len(pairs):
+        count_kinds(world, pairs, counts)
     return ListedDistances(
-        status=_take(rows.status, at, DistanceStatus.UNSUPPORTED),
-        distance=_take(rows.distance, at, np.nan),
-        lower=_take(rows.lower, at, np.nan),
-        upper=_take(rows.upper, at, np.nan),
-        point_a=np.where(swapped, point_b, point_a),
-        point_b=np.where(swapped, point_a, point_b),
-        normal=np.where(swapped, -normal, normal),
-        message=listed.message(unsupported),
+        status=rows.status,
+        distance=rows.distance,
+        lower=rows.lower,
+        upper=rows.upper,
+        point_a=rows.point_a,
+        point_b=rows.point_b,
+        normal=rows.normal,
+        message=_reasons(world, pairs[unsupported]) if unsupported.any() else "",
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
     )
+
+
+def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetration: bool) -> DistanceRows:
+    """Solids with solids, polygons with polygons, and nothing for the rest."""
+    count = len(pairs)
+    number, vector = np.full(count, np.nan), np.full((count, 3), np.nan)
+    status = np.full(count, DistanceStatus.UNSUPPORTED, np.uint8)
+    whole = DistanceRows(
+        pairs, number, number.copy(), number.copy(), vector, vector.copy(), vector.copy(), status, np.zeros(count)
+    )
+    for chosen, kernel in ((~planar.any(axis=1), solid_distances), (planar.all(axis=1), polygon_distances)):
+        part = kernel(world, pairs[chosen], penetration)
+        for column in fields(DistanceRows)[1:]:
+            getattr(whole, column.name)[chosen] = getattr(part, column.name)
+    return whole
+
+
+def _distinct(world: World, pairs: IntArray) -> None:
+    same = pairs[:, 0] == pairs[:, 1]
+    if same.any():
+        k = int(np.argmax(same))
+        raise GeometryError(f"pair {k} is {world.ids[pairs[k, 0]]!r} with itself")
+
+
+def _reasons(world: World, pairs: IntArray) -> str:
+    """Why distances of the listed pairs are unsupported, each reason once."""
+    comparable = world.planar[pairs[:, 0]] == world.planar[pairs[:, 1]]
+    reasons = [NO_DISTANCE.format(name) for name in world.pair_kinds(pairs[comparable])[0]]
+    return "; ".join(reasons + [NOT_COMPARED] * (not comparable.all()))
 
 
 def listed_first_contacts(
@@ -199,7 +226,7 @@ def listed_first_contacts(
         time_lower=_take(rows.lower, at, np.nan),
         time_upper=_take(rows.upper, at, np.nan),
         last_time=_take(rows.last_time, at, np.nan),
-        normal=np.where(listed.swapped[:, None], -normal, normal),
+        normal=np.where(listed.swapped[:, None], 0.0 - normal, normal),
         points=np.concatenate([none, *chosen]),
         point_offsets=np.cumsum([0, *map(len, chosen)], dtype=np.int64),
         message=listed.message(unsupported),
@@ -211,10 +238,8 @@ class _Listed:
     """Listed pairs, and the distinct ones among them that can be compared, smaller row first."""
 
     def __init__(self, world: World, pairs: IntArray) -> None:
-        low, high = pairs.min(axis=1), pairs.max(axis=1)
-        if (low == high).any():
-            k = int(np.argmax(low == high))
-            raise GeometryError(f"pair {k} is {world.ids[low[k]]!r} with itself")
+        _distinct(world, pairs)
+        low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
         self._world = world
         self._keys = low * len(world) + high
         self.swapped: BoolArray = pairs[:, 0] > pairs[:, 1]
@@ -234,7 +259,7 @@ class _Listed:
         """What is unsupported, each reason once."""
         reasons = list(dict.fromkeys(unsupported.reason.tolist()))
         if self.incomparable.any():
-            reasons.append("polygons are compared with polygons only")
+            reasons.append(NOT_COMPARED)
         return "; ".join(reasons)
 
 

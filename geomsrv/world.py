@@ -295,6 +295,9 @@ class World:
         """Names of the kind pairs that occur, such as "box-sphere", and which of them each pair is."""
         names = self.table.kind_names
         kinds = self.table.kind[self.shape[pairs]]
-        codes = kinds.min(axis=1, initial=len(names)) * len(names) + kinds.max(axis=1, initial=0)
-        present, which = np.unique(codes, return_inverse=True)
+        codes = np.minimum(kinds[:, 0], kinds[:, 1]) * len(names) + np.maximum(kinds[:, 0], kinds[:, 1])
+        # There are few kinds, so counting all their pairs beats sorting the codes.
+        occurs = np.bincount(codes, minlength=1) > 0
+        present = np.flatnonzero(occurs)
+        which = (np.cumsum(occurs) - 1)[codes]
         return [f"{names[code // len(names)]}-{names[code % len(names)]}" for code in present.tolist()], which

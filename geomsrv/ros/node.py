@@ -44,7 +44,7 @@ from geomsrv.ros.handlers import Handlers
 from geomsrv.ros.inputs import Inputs
 from geomsrv.ros.markers import Markers
 
-__all__ = ["INPUTS", "OUTPUTS", "SERVICES", "GeomsrvNode", "main"]
+__all__ = ["DIAGNOSTICS", "INPUTS", "OUTPUTS", "SERVICES", "STATE", "GeomsrvNode", "main"]
 
 
 class Topic(NamedTuple):

@@ -150,14 +150,17 @@ def policy_mismatches(offered: Any, requested: Any) -> list[str]:
     if offered.liveliness.name == "AUTOMATIC" and requested.liveliness.name == "MANUAL_BY_TOPIC":
         found.append("liveliness: publisher is automatic, subscription wants manual by topic")
     for name in ("deadline", "liveliness_lease_duration"):
-        given, wanted = getattr(offered, name).nanoseconds, getattr(requested, name).nanoseconds
-        # 0 stands for "not set", which is for ever.
-        if wanted and (not given or given > wanted):
-            promised = f"{given * 1e-9:g} s" if given else "nothing"
-            found.append(
-                f"{name.replace('_', ' ')}: publisher promises {promised}, subscription wants {wanted * 1e-9:g} s"
-            )
+        given, wanted = (_seconds(getattr(profile, name)) for profile in (offered, requested))
+        if given > wanted:
+            words = f"publisher promises {given:g} s, subscription wants {wanted:g} s"
+            found.append(f"{name.replace('_', ' ')}: {words}")
     return found
+
+
+def _seconds(duration: Any) -> float:
+    """A duration of a profile; 0 stands for "not set", which is for ever, as the largest int64 is."""
+    nanoseconds = duration.nanoseconds
+    return np.inf if nanoseconds == 0 or nanoseconds >= np.iinfo(np.int64).max else nanoseconds * 1e-9
 
 
 def endpoint_mismatches(
