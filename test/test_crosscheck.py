@@ -573,7 +573,7 @@ def test_a_lost_worker_costs_one_pair(name, rng, faulty, monkeypatch):
     faulty(fault)
     monkeypatch.setattr(_fcl_process, "GRACE_S", 0.3)
     start = time.monotonic()
-    with CrossCheck("all", timeout_s=0.3, queue_limit=1000) as check:
+    with CrossCheck("all", timeout_s=1.0, queue_limit=1000) as check:
         slowest = 0.0
         for batch in (poisoned(300, [100], rng), poisoned(50, [], rng)):
             before = time.monotonic()
