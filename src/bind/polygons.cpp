@@ -5,6 +5,7 @@
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/polygon.hpp"
+#include "geom/polygon_distance.hpp"
 #include "geom/polygon_first_contact.hpp"
 
 namespace geomsrv::bind {
@@ -94,6 +95,32 @@ std::vector<Vec2> first_contacts(const Rings& a, const Rings& b, const Rows2& ve
     return points;
 }
 
+struct DistanceRows {
+    double* distance;
+    double* lower;
+    double* upper;
+    Vec2* point_a;
+    Vec2* point_b;
+    Vec2* normal;
+    std::uint8_t* status;
+};
+
+void distances(const Rings& a, const Rings& b, bool penetration, const DistanceRows& rows) {
+    constexpr std::uint8_t kOk = 0;
+    const std::size_t count = a.size() == 1 ? b.size() : a.size();
+    PolygonDistanceSolver solver(largest_ring(a), largest_ring(b));
+    for (std::size_t i = 0; i < count; ++i) {
+        const PolygonDistance found = solver.solve(a[item(a.size(), i)], b[item(b.size(), i)], penetration);
+        rows.distance[i] = found.distance;
+        rows.lower[i] = found.lower;
+        rows.upper[i] = found.upper;
+        rows.point_a[i] = found.point_a;
+        rows.point_b[i] = found.point_b;
+        rows.normal[i] = found.normal;
+        rows.status[i] = kOk;
+    }
+}
+
 struct BatchReport {
     std::int64_t ring = -1;
     RingReport report;
@@ -159,6 +186,32 @@ void define_polygons(nb::module_& m) {
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
         nb::arg("velocity_a").noconvert(), nb::arg("velocity_b").noconvert(), nb::arg("t_max"),
         nb::arg("contact_set"));
+    m.def(
+        "distance_polygons",
+        [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
+           const Offsets& offsets_b, bool penetration) {
+            const Rings a(vertices_a, offsets_a);
+            const Rings b(vertices_b, offsets_b);
+            const std::size_t count = a.size() == 1 ? b.size() : a.size();
+            const auto distance = empty<double>({count});
+            const auto lower = empty<double>({count});
+            const auto upper = empty<double>({count});
+            const auto point_a = empty<double>({count, 2});
+            const auto point_b = empty<double>({count, 2});
+            const auto normal = empty<double>({count, 2});
+            const auto status = empty<std::uint8_t>({count});
+            {
+                const nb::gil_scoped_release unlocked;
+                distances(a, b, penetration,
+                          {distance.data, lower.data, upper.data, reinterpret_cast<Vec2*>(point_a.data),
+                           reinterpret_cast<Vec2*>(point_b.data), reinterpret_cast<Vec2*>(normal.data),
+                           status.data});
+            }
+            return nb::make_tuple(distance.array, lower.array, upper.array, point_a.array, point_b.array,
+                                  normal.array, status.array);
+        },
+        nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
+        nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(), nb::arg("penetration"));
 }
 
 }  // namespace geomsrv::bind

@@ -421,13 +421,6 @@ bool has_interior(const PolygonPair& pair, int side, const Slacks& slacks) {
            slacks.gap_rounding * size + std::min(2.0 * slacks.gap_noise * size, slacks.gap_limit * size);
 }
 
-/// Unit vector, whatever the length of v; v is not zero.
-Vec2 unit(Vec2 v) {
-    const double largest_part = std::max(std::fabs(v.x), std::fabs(v.y));
-    const Vec2 reduced{v.x / largest_part, v.y / largest_part};
-    return (1.0 / norm(reduced)) * reduced;
-}
-
 /// Scaled times in seconds: a power of two, so only subnormal results are rounded.
 struct Seconds {
     int exponent;

@@ -161,13 +161,6 @@ double place_scaled(const PairedPolygon& p, Vec2 origin, double before, double s
     return largest_part;
 }
 
-/// Unit vector, whatever the length of v; v is not zero.
-Vec2 unit(Vec2 v) {
-    const double largest = largest_coordinate(v);
-    const Vec2 reduced{v.x / largest, v.y / largest};
-    return (1.0 / norm(reduced)) * reduced;
-}
-
 /// Writes the tip axes behind those of the edges; false if there are more than a convex ring can have.
 bool place_tips(PairedPolygon& p) {
     // Two, or three by rounding if the ring is an equilateral triangle.

@@ -21,6 +21,7 @@
 // other corners the normals are at most 120 degrees apart.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -115,6 +116,13 @@ struct Slack {
     double noise = 0.0;
     double limit = 0.0;
 };
+
+/// Unit vector, whatever the length of v; v is not zero.
+inline Vec2 unit(Vec2 v) {
+    const double largest = std::max(std::fabs(v.x), std::fabs(v.y));
+    const Vec2 reduced{v.x / largest, v.y / largest};
+    return (1.0 / norm(reduced)) * reduced;
+}
 
 class PolygonPair {
 public:
