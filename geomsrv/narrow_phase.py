@@ -24,6 +24,7 @@ __all__ = [
     "DistanceRows",
     "distance_rows",
     "first_contact_rows",
+    "polygon_contacts",
     "polygon_distances",
     "relative_poses",
     "solid_distances",
@@ -263,7 +264,7 @@ def first_contact_rows(
 
 def _sliding_polygons(world: World, pairs: IntArray, horizon: float, counts: Counter[str]) -> ContactRows:
     """Polygons in translation."""
-    rows = _polygon_contacts(world, pairs, world.twists[:, :2], horizon)
+    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     # A velocity that is off displaces by no more than this until the end of the time looked at.
     drift = world.velocity_uncertainty[pairs].sum(axis=1)
@@ -282,7 +283,7 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, counts: Cou
     return rows.take(~never | ~np.isnan(rows.lower))
 
 
-def _polygon_contacts(world: World, pairs: IntArray, velocities: FloatArray, horizon: float) -> ContactRows:
+def polygon_contacts(world: World, pairs: IntArray, velocities: FloatArray, horizon: float) -> ContactRows:
     """The engine's answer for polygons with the given velocities."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
     velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k]]) for k in range(2))
@@ -378,7 +379,7 @@ def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, cou
 
 def _spinning_polygons(world: World, pairs: IntArray) -> tuple[ContactRows, Unsupported]:
     """Polygons that turn: in contact now, or unsupported."""
-    rows = _polygon_contacts(world, pairs, np.zeros((len(world), 2)), 0.0)
+    rows = polygon_contacts(world, pairs, np.zeros((len(world), 2)), 0.0)
     apart = rows.status == ContactStatus.NEVER
     rows.status[apart] = ContactStatus.UNSUPPORTED
     rows.last_time[:] = np.nan

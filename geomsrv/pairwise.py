@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,16 @@ from geomsrv.narrow_phase import (
     Unsupported,
     count_kinds,
     first_contact_rows,
+    polygon_contacts,
     polygon_distances,
     solid_distances,
 )
 from geomsrv.placement import laid_flat
-from geomsrv.shapes import Frustum, Polygon, Shape
+from geomsrv.shapes import Frustum, Shape
 from geomsrv.world import ShapeTable, World
 
 __all__ = [
+    "Bodies",
     "ListedContacts",
     "ListedDistances",
     "listed_distances",
@@ -99,43 +102,71 @@ class ListedContacts:
     cost: Cost
 
 
-def world_of(shapes: Sequence[Shape | Frustum], poses: FloatArray, twists: FloatArray | None = None) -> World:
-    """Objects "0", "1", ... that are in no scene.
+class Bodies(NamedTuple):
+    """Shapes that are in no scene, listed under a name."""
 
-    Parameters
-    ----------
-    shapes : sequence of n Shape
-    poses : (n, 7) float
-    twists : (n, 6) float, optional
-        By default at rest.
+    shapes: Sequence[Shape | Frustum]
+    poses: FloatArray  #: (n, 7), not yet checked
+    twists: FloatArray  #: (n, 6), not yet checked; no row at all: at rest
+    suffix: str = ""  #: a fault is one of "poses" + suffix
+
+
+def world_of(*sides: Bodies) -> World:
+    """Bodies as the objects "0", "1", ... of a world.
 
     Raises
     ------
     GeometryError
-        Names the index and the fault.
+        Names the list, the index and the fault.
     """
-    placed = _validate.poses(poses)
-    moving = np.zeros((len(placed), 6)) if twists is None else _validate.floats(twists, "twists", (len(placed), 6))
-    planar = np.array([isinstance(shape, Polygon) for shape in shapes], dtype=bool)
-    if planar.any():
-        placed, faults = laid_flat(placed, moving, planar)
+    counts = [len(side.shapes) for side in sides]
+    poses = _checked(sides, "poses", [side.poses for side in sides], _validate.poses)
+    if any(len(side.twists) for side in sides):
+        whole = [
+            side.twists if len(side.twists) else np.zeros((count, 6)) for side, count in zip(sides, counts, strict=True)
+        ]
+        twists = _checked(sides, "twists", whole, lambda rows, name: _validate.floats(rows, name, (None, 6)))
+    else:
+        twists = np.zeros((sum(counts), 6))
+    table = _table(tuple(shape for side in sides for shape in side.shapes))
+    if table.planar.any():
+        poses, faults = laid_flat(poses, twists, table.planar)
         for row, text in faults.items():
-            raise GeometryError(f"poses[{row}]: {text}")
-    count = len(shapes)
+            k = int(np.searchsorted(np.cumsum(counts), row, side="right"))
+            raise GeometryError(f"poses{sides[k].suffix}[{row - sum(counts[:k])}]: {text}")
+    ids = tuple(map(str, range(len(poses))))
     return World(
-        ids=tuple(map(str, range(count))),
-        index={str(row): row for row in range(count)},
-        table=ShapeTable.of(shapes),
-        shape=np.arange(count),
-        uncertainty=np.zeros(count),
-        velocity_uncertainty=np.zeros(count),
+        ids=ids,
+        index=dict(zip(ids, range(len(ids)), strict=True)),
+        table=table,
+        shape=np.arange(len(ids)),
+        uncertainty=np.zeros(len(ids)),
+        velocity_uncertainty=np.zeros(len(ids)),
         motion_faults={},
-        poses=placed,
-        twists=moving,
+        poses=poses,
+        twists=twists,
         allowed=np.zeros(0, np.int64),
         version=0,
         stamp=None,
     )
+
+
+def _checked(
+    sides: Sequence[Bodies], name: str, rows: Sequence[FloatArray], check: Callable[[FloatArray, str], FloatArray]
+) -> FloatArray:
+    """All rows, checked at once; only a fault is looked for list by list, to be named."""
+    try:
+        return check(np.concatenate(rows), name)
+    except GeometryError:
+        for side, part in zip(sides, rows, strict=True):
+            check(part, f"{name}{side.suffix}")
+        raise
+
+
+@lru_cache(maxsize=128)
+def _table(shapes: tuple[Shape | Frustum, ...]) -> ShapeTable:
+    """Table of the very same shapes as before, as a client asks about them again and again."""
+    return ShapeTable.of(shapes)
 
 
 def listed_distances(
@@ -208,6 +239,8 @@ def listed_first_contacts(
     end = float(_validate.floats(horizon, "horizon", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"horizon must be >= 0, got {end}")
+    if _all_slide(world, pairs):
+        return _sliding_polygons(world, pairs, end, tier, start)
     listed = _Listed(world, pairs)
     rows, unsupported = first_contact_rows(world, listed.comparable, end, counts)
     at = listed.rows_among(rows.pairs)
@@ -230,6 +263,39 @@ def listed_first_contacts(
         points=np.concatenate([none, *chosen]),
         point_offsets=np.cumsum([0, *map(len, chosen)], dtype=np.int64),
         message=listed.message(unsupported),
+        cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+    )
+
+
+def _all_slide(world: World, pairs: IntArray) -> bool:
+    """Whether all are polygons in translation, exactly where they are said to be: the kernel's own case."""
+    rows = pairs.ravel()
+    return not (
+        (~world.planar[rows]).any()
+        or world.turns[rows].any()
+        or world.uncertainty[rows].any()
+        or world.velocity_uncertainty[rows].any()
+    )
+
+
+def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, start: int) -> ListedContacts:
+    _distinct(world, pairs)
+    counts = Counter[str]()
+    if len(pairs):
+        count_kinds(world, pairs, counts)
+    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon)
+    none = np.zeros((0, 3))
+    sets = [none if points is None else points for points in rows.points]
+    return ListedContacts(
+        status=rows.status,
+        time=rows.time,
+        time_lower=rows.lower,
+        time_upper=rows.upper,
+        last_time=rows.last_time,
+        normal=rows.normal,
+        points=np.concatenate([none, *sets]),
+        point_offsets=np.cumsum([0, *map(len, sets)], dtype=np.int64),
+        message="",
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
     )
 

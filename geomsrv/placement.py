@@ -66,6 +66,9 @@ def laid_flat(poses: FloatArray, twists: FloatArray | None, planar: BoolArray) -
     """Poses with polygons exactly in the plane, and which of them are not in it or leave it."""
     if not planar.any():
         return poses, {}
+    out_of_plane = poses[planar, 2:5].any() or (twists is not None and twists[planar, 2:5].any())
+    if not out_of_plane:
+        return poses, {}
     faults: Faults = {}
     plane = "the plane z = 0 of the fixed frame"
     with np.errstate(invalid="ignore"):

@@ -179,6 +179,9 @@ def supported_kinds() -> BoolArray:
 
 def gather(vertices: FloatArray, offsets: IntArray, rows: IntArray) -> tuple[FloatArray, IntArray]:
     """The listed rows of a ragged array, end to end, and their offsets."""
+    if len(rows) == 1:
+        only = vertices[offsets[rows[0]] : offsets[rows[0] + 1]]
+        return only, np.array([0, len(only)])
     counts = offsets[rows + 1] - offsets[rows]
     ends = np.concatenate([[0], np.cumsum(counts)])
     # Position k of the output belongs to the item whose stretch it falls in, and lies as far into it.
@@ -283,8 +286,13 @@ class World:
         """
         vertices, offsets = gather(self.table.ring_vertices, self.table.ring_offsets, self.shape)
         owner = np.repeat(np.arange(len(self)), np.diff(offsets))
-        turn = self.rotations[:, :2, :2][owner]
-        return np.einsum("kij,kj->ki", turn, vertices) + self.poses[owner, :2], offsets
+        place, turn = self.poses[owner, :2], self.poses[owner, 5]
+        if not turn.any():
+            return vertices + place, offsets
+        # What `rotations` has for a turn about z, to the last bit.
+        cosine, sine = 1 - 2 * (turn * turn), 2 * (turn * self.poses[owner, 6])
+        x, y = vertices.T
+        return np.column_stack([cosine * x - sine * y, sine * x + cosine * y]) + place, offsets
 
     def kind_counts(self, rows: IntArray) -> dict[str, int]:
         """How many of the given objects there are of each kind, by name."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import array
 import math
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -217,8 +218,19 @@ def shape_of(code: int, dimensions: Any, vertices: Any, triangles: Any = ()) -> 
 
 
 def shape_from(message: Any) -> AnyShape:
-    """geomsrv/Shape -> shape."""
-    return shape_of(message.type, message.dimensions, message.vertices, message.triangles)
+    """geomsrv/Shape -> shape; the same object for the same small shape, so that what is made from it can be kept."""
+    fields = (message.dimensions, message.vertices, message.triangles)
+    if sum(map(len, fields)) > LARGEST_KEPT_SHAPE:
+        return shape_of(message.type, *fields)
+    return _kept_shape(message.type, *map(tuple, fields))
+
+
+LARGEST_KEPT_SHAPE = 64  # numbers
+
+
+@lru_cache(maxsize=256)
+def _kept_shape(code: int, *fields: tuple[float, ...]) -> AnyShape:
+    return shape_of(code, *fields)
 
 
 def set_shape(message: Any, shape: AnyShape) -> None:

@@ -20,7 +20,7 @@ from geomsrv import _validate, queries
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
-from geomsrv.pairwise import ListedContacts, ListedDistances, listed_distances, listed_first_contacts, world_of
+from geomsrv.pairwise import Bodies, ListedContacts, ListedDistances, listed_distances, listed_first_contacts, world_of
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
@@ -180,7 +180,7 @@ class Handlers:
         frustum, scene = self._frustum(request), self.engine.scene
         if request.select == INLINE:
             _unused(request, "ids")
-            world, counts = world_of(*_bodies(request.shapes, request.poses, (), "")), Counter[str]()
+            world, counts = world_of(_bodies(request.shapes, request.poses, ())), Counter[str]()
             state, certain, boxed = sight(world, np.arange(len(world)), frustum, counts)
             message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
             cost = Cost(0, accuracy, dict(counts))
@@ -394,8 +394,8 @@ class Handlers:
                 )
                 for s in "ab"
             ]
-            world = world_of(sides[0][0] + sides[1][0], *(np.concatenate([sides[0][k], sides[1][k]]) for k in (1, 2)))
-            count = len(sides[0][0])
+            world = world_of(*sides)
+            count = len(sides[0].shapes)
             a, b = np.arange(count), np.arange(count, len(world))
             names = ("shapes_a", "shapes_b")
         else:
@@ -404,7 +404,9 @@ class Handlers:
             raise GeometryError(
                 f"{names[0]} and {names[1]} have {len(a)} and {len(b)} items; they must be as many, or one"
             )
-        return world, np.column_stack(np.broadcast_arrays(a, b))
+        pairs = np.empty((max(len(a), len(b)) if len(a) and len(b) else 0, 2), dtype=np.int64)
+        pairs[:, 0], pairs[:, 1] = a, b
+        return world, pairs
 
 
 _BY_IDS = ("ids_a", "ids_b")
@@ -425,10 +427,8 @@ def _rows_of(world: World, ids: Sequence[str], name: str) -> IntArray:
     return np.array([world.index[item] for item in ids], dtype=np.int64)
 
 
-def _bodies(
-    shapes: Sequence[Any], poses: Any, twists: Any, suffix: str
-) -> tuple[list[convert.AnyShape], FloatArray, FloatArray]:
-    """Shapes, poses (n, 7) and twists (n, 6) of an inline list."""
+def _bodies(shapes: Sequence[Any], poses: Any, twists: Any, suffix: str = "") -> Bodies:
+    """Shapes, poses and twists of an inline list."""
     bodies = []
     for i, item in enumerate(shapes):
         try:
@@ -438,11 +438,9 @@ def _bodies(
     placed, moving = convert.rows(poses, f"poses{suffix}", 7), convert.rows(twists, f"twists{suffix}", 6)
     if len(placed) != len(bodies):
         raise GeometryError(f"shapes{suffix} are {len(bodies)}, poses{suffix} are of {len(placed)}")
-    if len(twists) == 0:
-        moving = np.zeros((len(bodies), 6))
-    elif len(moving) != len(bodies):
+    if len(moving) not in (0, len(bodies)):
         raise GeometryError(f"shapes{suffix} are {len(bodies)}, twists{suffix} are of {len(moving)}")
-    return bodies, _validate.poses(placed, f"poses{suffix}"), _validate.floats(moving, f"twists{suffix}", (None, 6))
+    return Bodies(bodies, placed, moving, suffix)
 
 
 def _side(kind: int, values: Any, offsets: Any, side: str) -> Any:
