@@ -9,6 +9,7 @@
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/distance_table.hpp"
+#include "geom/place.hpp"
 #include "geom/placed_distance.hpp"
 
 namespace geomsrv::bind {
@@ -76,16 +77,29 @@ private:
     Output<std::int64_t> iterations_;
 };
 
-struct ShapeTable {
-    const std::uint8_t* kinds;
-    const double* params;
-    const double* vertices;
-    const std::int64_t* offsets;
-
-    ShapeView shape(std::int64_t i) const {
-        return {static_cast<ShapeKind>(kinds[i]), params + 4 * i, vertices + 3 * offsets[i],
-                static_cast<std::ptrdiff_t>(offsets[i + 1] - offsets[i])};
+/// The shapes of a batch, each looked through once.
+class ShapeTable {
+public:
+    ShapeTable(std::size_t count, const std::uint8_t* kinds, const double* params, const double* vertices,
+               const std::int64_t* offsets)
+        : extents_(count) {
+        shapes_.reserve(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            ShapeView shape{static_cast<ShapeKind>(kinds[i]), params + 4 * i, vertices + 3 * offsets[i],
+                            static_cast<std::ptrdiff_t>(offsets[i + 1] - offsets[i])};
+            if (shape.kind == ShapeKind::convex) {
+                extents_[i] = extent_of(shape);
+                shape.extent = &extents_[i];
+            }
+            shapes_.push_back(shape);
+        }
     }
+
+    const ShapeView& shape(std::int64_t i) const { return shapes_[static_cast<std::size_t>(i)]; }
+
+private:
+    std::vector<HullExtent> extents_;
+    std::vector<ShapeView> shapes_;
 };
 
 /// The longest hull of a table, so that one scratch buffer serves the whole batch.
@@ -109,11 +123,11 @@ nb::tuple distance_pairs(const Codes& kinds, const Rows4& params, const Rows3& v
     const Sink out(n);
     {
         const nb::gil_scoped_release unlocked;
-        const ShapeTable table{kinds.data(), params.data(), vertices.data(), offsets.data()};
+        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data());
         std::vector<double> scratch(6 * longest(offsets.data(), shapes));
         for (std::size_t i = 0; i < n; ++i) {
-            const ShapeView a = table.shape(pairs.data()[2 * i]);
-            const ShapeView b = table.shape(pairs.data()[2 * i + 1]);
+            const ShapeView& a = table.shape(pairs.data()[2 * i]);
+            const ShapeView& b = table.shape(pairs.data()[2 * i + 1]);
             const Transform X_ab = pose_of(poses_ab.data() + 7 * i);
             out.set(i, shape_distance(a, b, X_ab, penetration, scratch.data()));
         }
@@ -136,7 +150,7 @@ nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& 
     const Sink out(n);
     {
         const nb::gil_scoped_release unlocked;
-        const ShapeTable table{kinds.data(), params.data(), vertices.data(), offsets.data()};
+        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data());
         std::vector<double> scratch(6 * longest(offsets.data(), shapes));
         const auto placed = [&](std::int64_t row) {
             const std::int64_t k = shape.data()[row];
@@ -204,9 +218,13 @@ nb::tuple distance_polytopes(const Rows3& vertices_a, const Offsets& offsets_a, 
                              static_cast<std::ptrdiff_t>(offsets.data()[i + 1] - offsets.data()[i])};
         };
         for (std::size_t i = 0; i < n; ++i) {
-            out.set(i, shape_distance(hull(vertices_a, offsets_a, error_a, count_a == 1 ? 0 : i),
-                                      hull(vertices_b, offsets_b, error_b, count_b == 1 ? 0 : i), {},
-                                      penetration, scratch.data()));
+            ShapeView a = hull(vertices_a, offsets_a, error_a, count_a == 1 ? 0 : i);
+            ShapeView b = hull(vertices_b, offsets_b, error_b, count_b == 1 ? 0 : i);
+            const HullExtent extent_a = extent_of(a);
+            const HullExtent extent_b = extent_of(b);
+            a.extent = &extent_a;
+            b.extent = &extent_b;
+            out.set(i, shape_distance(a, b, {}, penetration, scratch.data()));
         }
     }
     return out.tuple();

@@ -82,20 +82,17 @@ constexpr Kernel kernel_of(ShapeKind a, ShapeKind b) {
     return kKernels[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
 }
 
-CoreSeparation swapped(CoreSeparation s) {
+/// The other way round.
+void swap_bodies(CoreSeparation& s) {
     std::swap(s.point_a, s.point_b);
     s.normal = -s.normal;
     for (int i = 0; i < s.witness.count; ++i) {
         std::swap(s.witness.a[i], s.witness.b[i]);
     }
-    return s;
 }
 
 /// Back to the caller's unit.  Only a result below the normal range rounds: then away from the value.
-CoreSeparation unscaled(CoreSeparation s, double scale) {
-    if (scale == 1.0) {
-        return s;
-    }
+void unscale(CoreSeparation& s, double scale) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const double unit = 1.0 / scale;
     s.value *= unit;
@@ -103,7 +100,11 @@ CoreSeparation unscaled(CoreSeparation s, double scale) {
     s.upper = std::nextafter(s.upper * unit, kInfinity);
     s.point_a = unit * s.point_a;
     s.point_b = unit * s.point_b;
-    return s;
+}
+
+/// What the shape is larger than its core by [m].
+double radius_of(const ShapeView& shape) {
+    return shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::capsule ? shape.params[0] : 0.0;
 }
 
 /// The signed distance of the shapes from that of their cores.
@@ -150,24 +151,35 @@ Separation with_radii(const CoreSeparation& core, double radius_a, double radius
 struct LocalPair {
     Placed a;
     Placed b;
-    double scale = 1.0;
 
     double size() const { return a.core.reach + b.core.reach; }
 };
 
-/// Places the pair, in a larger or smaller unit of length where its sizes leave the range of the kernels.
+/// The unit in which a pair comes into the range of the kernels.
 template <class Place, class Magnitude>
-LocalPair in_range_pair(LocalFrame frame, Place place_both, Magnitude magnitude) {
-    LocalPair pair = place_both(frame);
+double better_scale(LocalFrame frame, double size, Place place_both, Magnitude magnitude) {
     // Twice at most: numbers that overflow are first brought down to 1, and what then cancels is brought up
     // again.
-    for (int tries = 0; tries < 2 && !in_range(pair.size()); ++tries) {
-        const bool finite = pair.size() <= std::numeric_limits<double>::max();
-        frame.scale *= scale_for(finite ? pair.size() : frame.scale * magnitude());
-        pair = place_both(frame);
+    for (int tries = 0; tries < 2 && !in_range(size); ++tries) {
+        const bool finite = size <= std::numeric_limits<double>::max();
+        frame.scale *= scale_for(finite ? size : frame.scale * magnitude());
+        size = place_both(frame).size();
     }
-    pair.scale = frame.scale;
-    return pair;
+    return frame.scale;
+}
+
+/// Places the pair, in a larger or smaller unit of length where its sizes leave the range of the kernels, and
+/// solves.
+template <class Place, class Magnitude, class Solve>
+CoreSeparation solve_in_range(LocalFrame frame, Place place_both, Magnitude magnitude, Solve solve) {
+    const LocalPair pair = place_both(frame);
+    if (in_range(pair.size())) {
+        return solve(pair);
+    }
+    frame.scale = better_scale(frame, pair.size(), place_both, magnitude);
+    CoreSeparation out = solve(place_both(frame));
+    unscale(out, frame.scale);
+    return out;
 }
 
 }  // namespace
@@ -183,32 +195,36 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
     const bool anchored_b = a.kind == ShapeKind::half_space && b.kind != ShapeKind::half_space;
     LocalFrame frame;
     frame.origin = anchored_b ? X_ab * middle_of(b) : middle_of(a);
-    const LocalPair pair = in_range_pair(
+    CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
             return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
         },
-        [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); });
-    const CoreSeparation core =
-        flip ? swapped(kernel(pair.b, pair.a, penetration)) : kernel(pair.a, pair.b, penetration);
-    return with_radii(unscaled(core, pair.scale), pair.a.radius, pair.b.radius, frame.origin, penetration);
+        [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); },
+        [&](const LocalPair& pair) {
+            return flip ? kernel(pair.b, pair.a, penetration) : kernel(pair.a, pair.b, penetration);
+        });
+    if (flip) {
+        swap_bodies(core);
+    }
+    return with_radii(core, radius_of(a), radius_of(b), frame.origin, penetration);
 }
 
 Separation box_distance(const BoxView& a, const BoxView& b, bool penetration) {
     LocalFrame frame;
     frame.origin = a.center;
-    const LocalPair pair = in_range_pair(
+    const CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
-            return LocalPair{{place_box(a.center, a.axes, a.half_extents, f), {}, 0.0},
-                             {place_box(b.center, b.axes, b.half_extents, f), {}, 0.0}};
+            return LocalPair{{place_box(a.center, a.axes, a.half_extents, f), {}},
+                             {place_box(b.center, b.axes, b.half_extents, f), {}}};
         },
         [&] {
             return std::max({largest_of(a.center), largest_of(a.half_extents), largest_of(b.center),
                              largest_of(b.half_extents)});
-        });
-    return with_radii(unscaled(convex_convex(pair.a.core, pair.b.core, penetration), pair.scale), 0.0, 0.0,
-                      frame.origin, penetration);
+        },
+        [&](const LocalPair& pair) { return convex_convex(pair.a.core, pair.b.core, penetration); });
+    return with_radii(core, 0.0, 0.0, frame.origin, penetration);
 }
 
 }  // namespace geomsrv

@@ -63,12 +63,15 @@ FacetAxis deepest_facet(const Core& a, const Core& b) {
             best.upper = std::max(best.upper, gap + kAxisError * size * (product / area));
             if (gap > best.gap) {
                 best.gap = gap;
-                best.normal = normalized(dot(middle, n) < 0.0 ? -n : n);
+                best.normal = n;
                 best.found = true;
             }
         }
     }
     best.upper += turned;
+    if (best.found) {
+        best.normal = normalized(dot(middle, best.normal) < 0.0 ? -best.normal : best.normal);
+    }
     return best;
 }
 

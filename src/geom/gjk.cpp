@@ -34,7 +34,7 @@ struct Arithmetic<double> {
     static Vec difference(Vec3 b, Vec3 a) { return b - a; }
     static double root(double x) { return std::sqrt(x); }
     static double absolute(double x) { return std::abs(x); }
-    static Vec divided(Vec v, double s) { return {v.x / s, v.y / s, v.z / s}; }
+    static double reciprocal(double x) { return 1.0 / x; }
 };
 
 template <>
@@ -47,7 +47,7 @@ struct Arithmetic<DoubleDouble> {
     static Vec difference(Vec3 b, Vec3 a) { return exact_difference(b, a); }
     static DoubleDouble root(DoubleDouble x) { return sqrt(x); }
     static double absolute(DoubleDouble x) { return std::abs(x.hi); }
-    static Vec divided(Vec v, DoubleDouble s) { return {v.x / s, v.y / s, v.z / s}; }
+    static DoubleDouble reciprocal(DoubleDouble x) { return DoubleDouble{1.0, 0.0} / x; }
 };
 
 /// A vertex of K: w = b - a.
@@ -131,13 +131,14 @@ private:
         out.count = 2;
         out.keep[0] = i;
         out.keep[1] = j;
-        out.weight[1] = along / squared;
-        out.weight[0] = (squared - along) / squared;
+        const T inverse = Number::reciprocal(squared);
+        out.weight[1] = along * inverse;
+        out.weight[0] = (squared - along) * inverse;
         // From the nearer end; then take out what rounding has left along the edge, or a short vector would
         // lean.
         const bool near_i = out.weight[1] < T{0.5};
         out.direction = near_i ? w(i) + out.weight[1] * e : w(j) - out.weight[0] * e;
-        out.direction = out.direction - (dot(out.direction, e) / squared) * e;
+        out.direction = out.direction - (dot(out.direction, e) * inverse) * e;
         out.squared = dot(out.direction, out.direction);
         return out;
     }
@@ -159,12 +160,13 @@ private:
             out.keep[0] = i;
             out.keep[1] = j;
             out.keep[2] = k;
-            out.weight[0] = at_i / squared;
-            out.weight[1] = at_j / squared;
-            out.weight[2] = at_k / squared;
+            const T inverse = Number::reciprocal(squared);
+            out.weight[0] = at_i * inverse;
+            out.weight[1] = at_j * inverse;
+            out.weight[2] = at_k * inverse;
             const T height = dot(n, w(i));
             out.direction = height < T{0.0} ? -n : n;
-            out.squared = height * height / squared;
+            out.squared = height * height * inverse;
             return out;
         }
         // The nearest point is on an edge that the foot lies beyond; on a face without area, on any of them.
@@ -214,24 +216,33 @@ private:
 
 /// Keeps the vertices of the feature, in order.
 template <class T>
-Simplex<T> reduced(const Simplex<T>& simplex, const Nearest<T>& nearest) {
-    Simplex<T> out;
-    out.count = nearest.count;
+void reduce(Simplex<T>& simplex, const Nearest<T>& nearest) {
+    simplex.count = nearest.count;
     for (int i = 0; i < nearest.count; ++i) {
-        out.vertex[i] = simplex.vertex[nearest.keep[i]];
-        out.weight[i] = nearest.weight[i];
+        simplex.weight[i] = nearest.weight[i];
+        if (nearest.keep[i] != i) {
+            simplex.vertex[i] = simplex.vertex[nearest.keep[i]];
+        }
     }
-    return out;
 }
 
-/// Witness points of the weights, normalised in doubles so that they sum to 1.
 template <class T>
-Gjk with_points(Gjk out, const Simplex<T>& simplex) {
+bool holds(const Simplex<T>& simplex, int index_a, int index_b) {
+    for (int i = 0; i < simplex.count; ++i) {
+        if (simplex.vertex[i].index_a == index_a && simplex.vertex[i].index_b == index_b) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Sets the witness points to those of the weights, normalised in doubles so that they sum to 1.
+template <class T>
+void set_points(Gjk& out, const Simplex<T>& simplex) {
     double sum = 0.0;
     for (int i = 0; i < simplex.count; ++i) {
         sum += Arithmetic<T>::to_double(simplex.weight[i]);
     }
-    out.witness = {};
     out.witness.count = simplex.count;
     out.point_a = {};
     out.point_b = {};
@@ -245,75 +256,73 @@ Gjk with_points(Gjk out, const Simplex<T>& simplex) {
         out.point_b = out.point_b + weight * v.b;
     }
     out.length = norm(out.point_b - out.point_a);
-    return out;
 }
 
-/// Witness points of the nearest feature.  On needles and slivers weights in doubles are poor even where the
-/// length and the direction are good; then they are computed once more, from the same vertices, in
-/// double-double.
-template <class T>
-Gjk with_good_points(Gjk out, const Simplex<T>& feature, double size) {
-    out = with_points(out, feature);
-    const auto aside = [&](const Gjk& g) { return norm(g.point_b - g.point_a - g.gap * g.normal); };
-    if constexpr (std::is_same_v<T, double>) {
-        if (aside(out) > kMeetingGap * size) {
-            Simplex<DoubleDouble> wide;
-            wide.count = feature.count;
-            for (int i = 0; i < feature.count; ++i) {
-                const Vertex<double>& v = feature.vertex[i];
-                wide.vertex[i] = {v.index_a, v.index_b, v.a, v.b, exact_difference(v.b, v.a)};
-            }
-            const auto answer = Solver<DoubleDouble>(wide, size).solve();
-            const Gjk other = with_points(out, reduced(wide, answer.nearest));
-            return aside(other) < aside(out) ? other : out;
-        }
+/// What is left of the vector between the witness points besides the gap.
+double aside(const Gjk& found) { return norm(found.point_b - found.point_a - found.gap * found.normal); }
+
+/// On needles and slivers, weights and direction from doubles are poor even where the length is good: once
+/// more, from the same vertices, in double-double.
+void polish(Gjk& out, const Simplex<double>& simplex, double size) {
+    Simplex<DoubleDouble> wide;
+    wide.count = simplex.count;
+    for (int i = 0; i < simplex.count; ++i) {
+        const Vertex<double>& v = simplex.vertex[i];
+        wide.vertex[i] = {v.index_a, v.index_b, v.a, v.b, exact_difference(v.b, v.a)};
     }
-    return out;
+    const Nearest<DoubleDouble> nearest = Solver<DoubleDouble>(wide, size).solve().nearest;
+    reduce(wide, nearest);
+    Gjk other = out;
+    set_points(other, wide);
+    const Vec3 direction = narrow(nearest.direction);
+    if (norm(direction) > 0.0) {
+        other.normal = normalized(direction);
+    }
+    if (aside(other) < aside(out)) {
+        out = other;
+    }
 }
+void polish(Gjk&, const Simplex<DoubleDouble>&, double) {}
 
 template <class T>
 Gjk run(const Core& a, const Core& b, Vec3 start) {
     using Number = Arithmetic<T>;
-    using Vec = typename Number::Vec;
     const double size = a.reach + b.reach;
     Gjk out;
-    Simplex<T> simplex;  // candidate
-    Simplex<T> feature;  // the feature of it that holds the nearest point so far
-    T shortest = T{std::numeric_limits<double>::infinity()};
-    Vec n = Number::from(start);
-    T length = T{std::numeric_limits<double>::infinity()};
+    Simplex<T> simplex;  // spans the feature of K that holds the nearest point so far
+    T squared = T{std::numeric_limits<double>::infinity()};
+    double length = std::numeric_limits<double>::infinity();
+    typename Number::Vec n = Number::from(start);
     while (true) {
         // The vertex of K furthest against n, and with it the gap between the supports.
         const auto top = highest(a, n);
         const auto bottom = lowest(b, n);
         const double gap = Number::to_double(bottom.value - top.value);
-        if (gap > out.gap) {
+        const bool met = length - gap <= kMeetingGap * size;
+        if (gap > out.gap || met) {
+            // If met, not an earlier direction that did as well: this one points from one nearest point to
+            // the other.
             out.gap = gap;
             out.normal = Number::to_vec3(n);
         }
-        if (feature.count > 0 && Number::to_double(length) - gap <= kMeetingGap * size) {
-            // Not an earlier direction that did as well: this one points from one nearest point to the other.
-            out.gap = gap;
-            out.normal = Number::to_vec3(n);
-            out = with_good_points(out, feature, size);
-            // What counts is the length between the points, which have their own rounding.
-            out.state = out.length - out.gap <= kMeetingGap * size ? GjkState::apart : GjkState::stalled;
-            return out;
-        }
-        if (feature.count > 0 && Number::to_double(length) <= kContact * size) {
-            out = with_good_points(out, feature, size);
-            out.state = out.length <= 2 * kContact * size ? GjkState::contact : GjkState::stalled;
-            return out;
-        }
-        simplex = feature;
-        for (int i = 0; i < simplex.count; ++i) {
-            if (simplex.vertex[i].index_a == top.vertex && simplex.vertex[i].index_b == bottom.vertex) {
-                return with_points(out,
-                                   feature);  // stalled: nothing lies beyond, yet the bounds have not met
+        if (met || length <= kContact * size) {
+            set_points(out, simplex);
+            if (aside(out) > kMeetingGap * size) {
+                polish(out, simplex, size);
             }
+            // What counts is the length between the points, which have their own rounding.
+            const bool good = out.length <= (met ? out.gap + kMeetingGap * size : 2 * kContact * size);
+            out.state = !good ? GjkState::stalled : met ? GjkState::apart : GjkState::contact;
+            return out;
+        }
+        if (holds(simplex, top.vertex, bottom.vertex)) {
+            break;  // nothing lies beyond, yet the bounds have not met
         }
         Vertex<T>& added = simplex.vertex[simplex.count++];
-        added = {top.vertex, bottom.vertex, vertex_of(a, top.vertex), vertex_of(b, bottom.vertex), {}};
+        added.index_a = top.vertex;
+        added.index_b = bottom.vertex;
+        added.a = vertex_of(a, top.vertex);
+        added.b = vertex_of(b, bottom.vertex);
         added.w = Number::difference(added.b, added.a);
 
         const auto answer = Solver<T>(simplex, size).solve();
@@ -321,24 +330,28 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
             for (int i = 0; i < 4; ++i) {
                 simplex.weight[i] = answer.inside[i];
             }
-            out = with_points(out, simplex);
+            set_points(out, simplex);
             out.state = GjkState::enclosed;
             return out;
         }
-        if (!(answer.nearest.squared < shortest) || ++out.iterations > kMaxSteps) {
-            return with_points(out, feature);  // stalled
+        if (!(answer.nearest.squared < squared) || ++out.iterations > kMaxSteps) {
+            --simplex.count;
+            break;
         }
-        shortest = answer.nearest.squared;
-        length = Number::root(shortest);
-        feature = reduced(simplex, answer.nearest);
-        const T size_of_direction = Number::root(dot(answer.nearest.direction, answer.nearest.direction));
-        if (!(size_of_direction > T{0.0})) {
-            out = with_points(out, feature);
+        reduce(simplex, answer.nearest);
+        squared = answer.nearest.squared;
+        length = Number::to_double(Number::root(squared));
+        const T direction = Number::root(dot(answer.nearest.direction, answer.nearest.direction));
+        if (!(direction > T{0.0})) {
+            set_points(out, simplex);
             out.state = GjkState::contact;
             return out;
         }
-        n = Number::divided(answer.nearest.direction, size_of_direction);
+        n = Number::reciprocal(direction) * answer.nearest.direction;
     }
+    set_points(out, simplex);
+    out.state = GjkState::stalled;
+    return out;
 }
 
 }  // namespace

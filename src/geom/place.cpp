@@ -31,25 +31,6 @@ Vec3 column(const Mat3& r, int i) {
     return {at(r.row[0]), at(r.row[1]), at(r.row[2])};
 }
 
-struct Bounds {
-    Vec3 lower;
-    Vec3 upper;
-};
-
-Bounds bounds_of(const ShapeView& shape) {
-    Bounds out{{shape.vertices[0], shape.vertices[1], shape.vertices[2]}, {}};
-    out.upper = out.lower;
-    for (std::ptrdiff_t i = 1; i < shape.count; ++i) {
-        const double* v = shape.vertices + 3 * i;
-        out.lower = {std::min(out.lower.x, v[0]), std::min(out.lower.y, v[1]), std::min(out.lower.z, v[2])};
-        out.upper = {std::max(out.upper.x, v[0]), std::max(out.upper.y, v[1]), std::max(out.upper.z, v[2])};
-    }
-    return out;
-}
-
-/// Halves first: the sum of two large coordinates must not overflow.
-Vec3 middle_of(const Bounds& bounds) { return 0.5 * bounds.lower + 0.5 * bounds.upper; }
-
 /// A vector with a bound of its rounding.
 struct Rounded {
     Vec3 value;
@@ -60,23 +41,30 @@ Rounded rounded(WideVec3 v, double size) {
     return {narrow(v), safe_norm({v.x.lo, v.y.lo, v.z.lo}) + 8 * kWideRoundoff * size};
 }
 
-/// scale * (R m + t - origin): far apart these cancel, so the sum is formed in double-double.
-Rounded relative(Vec3 m, const Transform& X, const LocalFrame& frame) {
+bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
+
+/// scale * (R m + t - origin): far from the origin these cancel, so the sum is formed in double-double.
+Rounded relative_wide(Vec3 m, const Transform& X, const LocalFrame& frame, bool turned) {
     const Vec3 t = frame.scale * X.translation;
     const Vec3 o = frame.scale * frame.origin;
-    const bool centered = m.x == 0.0 && m.y == 0.0 && m.z == 0.0;
-    const bool local = o.x == 0.0 && o.y == 0.0 && o.z == 0.0;
-    if (centered && local) {
-        return {t, 0.0};
+    const Vec3 p = frame.scale * m;
+    if (!turned) {
+        // A sum is off relative to its result only.
+        const WideVec3 sum = widen(p) + exact_difference(t, o);
+        return rounded(sum, safe_norm(narrow(sum)));
     }
-    const WideVec3 p = widen(frame.scale * m);
-    const auto row = [&](int i) { return dot(p, X.rotation.row[i]); };
-    const WideVec3 turned = {row(0), row(1), row(2)};
-    const WideVec3 sum = turned + exact_difference(t, o);
-    // A sum is off relative to its result only; the products of a rotation are off relative to themselves.
-    const double size = is_identity(X.rotation) ? safe_norm(narrow(sum))
-                                                : safe_norm(frame.scale * m) + safe_norm(t) + safe_norm(o);
-    return rounded(sum, size);
+    // The products of a rotation are off relative to themselves.
+    const auto row = [&](int i) { return dot(widen(p), X.rotation.row[i]); };
+    const WideVec3 rotated = {row(0), row(1), row(2)};
+    return rounded(rotated + exact_difference(t, o), safe_norm(p) + safe_norm(t) + safe_norm(o));
+}
+
+/// The same, at no cost where nothing can round.
+Rounded relative(Vec3 m, const Transform& X, const LocalFrame& frame, bool turned) {
+    if (is_zero(m) && is_zero(frame.origin)) {
+        return {frame.scale * X.translation, 0.0};
+    }
+    return relative_wide(m, X, frame, turned);
 }
 
 PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, const LocalFrame& frame) {
@@ -98,11 +86,10 @@ PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, con
 
 void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch,
                 Core& core) {
-    const Bounds bounds = bounds_of(shape);
-    const Vec3 middle = middle_of(bounds);
+    const HullExtent extent = shape.extent != nullptr ? *shape.extent : extent_of(shape);
     const double scale = frame.scale;
-    const Vec3 m = scale * middle;
-    const double spread = safe_norm(scale * (bounds.upper - middle)) * kRoundedUp;
+    const Vec3 m = scale * extent.middle;
+    const double spread = scale * extent.spread;
     const auto n = static_cast<std::size_t>(shape.count);
     double* x = scratch;
     double* y = x + n;
@@ -117,7 +104,7 @@ void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& fr
         y[i] = p.y;
         z[i] = p.z;
     }
-    const Rounded center = relative(middle, X, frame);
+    const Rounded center = relative(extent.middle, X, frame, turned);
     core.center = center.value;
     core.points = scratch;
     core.count = static_cast<int>(shape.count);
@@ -147,8 +134,27 @@ double scale_for(double size) {
     return std::ldexp(1.0, std::clamp(-std::ilogb(size), -1000, 1000));
 }
 
+HullExtent extent_of(const ShapeView& shape) {
+    Vec3 lower{shape.vertices[0], shape.vertices[1], shape.vertices[2]};
+    Vec3 upper = lower;
+    for (std::ptrdiff_t i = 1; i < shape.count; ++i) {
+        const double* v = shape.vertices + 3 * i;
+        lower = {std::min(lower.x, v[0]), std::min(lower.y, v[1]), std::min(lower.z, v[2])};
+        upper = {std::max(upper.x, v[0]), std::max(upper.y, v[1]), std::max(upper.z, v[2])};
+    }
+    // Halves first: the sum of two large coordinates must not overflow.
+    const Vec3 middle = 0.5 * lower + 0.5 * upper;
+    const Vec3 far = {std::max(upper.x - middle.x, middle.x - lower.x),
+                      std::max(upper.y - middle.y, middle.y - lower.y),
+                      std::max(upper.z - middle.z, middle.z - lower.z)};
+    return {middle, safe_norm(far) * kRoundedUp};
+}
+
 Vec3 middle_of(const ShapeView& shape) {
-    return shape.kind == ShapeKind::convex ? middle_of(bounds_of(shape)) : Vec3{};
+    if (shape.kind != ShapeKind::convex) {
+        return {};
+    }
+    return shape.extent != nullptr ? shape.extent->middle : extent_of(shape).middle;
 }
 
 double magnitude_of(const ShapeView& shape, const Transform& X) {
@@ -175,7 +181,8 @@ Placed place(const ShapeView& shape, const Transform& X, const LocalFrame& frame
         place_hull(shape, X, frame, scratch, core);
         return out;
     }
-    const Rounded center = relative({}, X, frame);
+    const bool turned = !is_identity(X.rotation);
+    const Rounded center = relative({}, X, frame, turned);
     core.center = center.value;
     double spread = 0.0;
     if (shape.kind == ShapeKind::box) {
@@ -185,18 +192,15 @@ Placed place(const ShapeView& shape, const Transform& X, const LocalFrame& frame
             core.generator[i] = half * column(X.rotation, i);
             spread += half;
         }
-    } else {
-        out.radius = shape.params[0];
-        if (shape.kind == ShapeKind::capsule) {
-            core.generators = 1;
-            const double half = frame.scale * shape.params[1];
-            core.generator[0] = half * column(X.rotation, 2);
-            spread = half;
-        }
+    } else if (shape.kind == ShapeKind::capsule) {
+        core.generators = 1;
+        const double half = frame.scale * shape.params[1];
+        core.generator[0] = half * column(X.rotation, 2);
+        spread = half;
     }
     spread *= 1.0 + kRotationStretch;
     core.reach = (safe_norm(core.center) + spread) * kRoundedUp;
-    core.error = center.error + (is_identity(X.rotation) ? 0.0 : kUnitRoundoff * spread);
+    core.error = center.error + (turned ? kUnitRoundoff * spread : 0.0);
     return out;
 }
 

@@ -14,7 +14,6 @@ namespace geomsrv {
 struct Placed {
     Core core;                   ///< unless it is a half space
     PlacedHalfSpace half_space;  ///< if it is one
-    double radius = 0.0;         ///< what the shape is larger than its core by, never scaled
 };
 
 /// Axes of the first shape (or the world), another origin, another unit of length.
@@ -22,6 +21,9 @@ struct LocalFrame {
     Vec3 origin;         ///< in those axes [m]
     double scale = 1.0;  ///< power of two: local = scale * (world - origin)
 };
+
+/// REQUIRES: a convex shape with at least one vertex.
+HullExtent extent_of(const ShapeView& shape);
 
 /// A point of the shape about its middle, in its own frame: the middle of a hull's bounding box, the origin
 /// of others. Not meaningful for a half space.

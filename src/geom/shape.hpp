@@ -29,12 +29,19 @@ inline constexpr const char* kShapeNames[] = {"sphere",   "capsule", "box",     
                                               "cylinder", "cone",    "ellipsoid", "mesh",   "polygon"};
 inline constexpr std::size_t kShapeKinds = sizeof(kShapeNames) / sizeof(kShapeNames[0]);
 
+/// Where the points of a hull lie.
+struct HullExtent {
+    Vec3 middle;          ///< of their bounding box
+    double spread = 0.0;  ///< no point is further from the middle
+};
+
 /// One shape in its own frame; the arrays belong to the caller.
 struct ShapeView {
     ShapeKind kind = ShapeKind::sphere;
     const double* params = nullptr;    ///< 4 numbers, see ShapeKind [m]
     const double* vertices = nullptr;  ///< 3 * count coordinates of a convex shape [m]
     std::ptrdiff_t count = 0;
+    const HullExtent* extent = nullptr;  ///< of a convex shape, if the caller knows it; see extent_of
 };
 
 /// Rotation of the unit quaternion x y z w, rounded exactly as geomsrv._validate.rotation_matrices rounds it:
