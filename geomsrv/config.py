@@ -8,11 +8,11 @@ The defaults live here and nowhere else; ``config/geomsrv.yaml`` repeats them fo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
-from geomsrv.errors import GeometryError
+from geomsrv.errors import GeometryError, NotAvailableError
 
 __all__ = ["Config", "Setting", "settings"]
 
@@ -53,11 +53,10 @@ class Setting:
         if kind is float and type(value) is int:
             value = float(value)
         if self.length:
-            if len(value) != self.length or not all(isinstance(x, (int, float)) for x in value):
-                return f"{self.name} must be {self.length} numbers, got {list(value)!r}"
-            if not all(math.isfinite(x) for x in value):
-                return f"{self.name} must be finite, got {list(value)!r}"
-            return ""
+            numbers = isinstance(value, tuple) and all(isinstance(x, (int, float)) for x in value)
+            if not numbers or len(value) != self.length:
+                return f"{self.name} must be {self.length} numbers, got {value!r}"
+            return "" if all(map(math.isfinite, value)) else f"{self.name} must be finite, got {value!r}"
         if type(value) is not kind:
             return f"{self.name} must be {kind.__name__}, got {value!r}"
         if self.choices and value not in self.choices:
@@ -185,6 +184,8 @@ class Config:
             fault = setting.fault(getattr(self, item.name), item.default)
             if fault:
                 raise GeometryError(fault)
+        if self.accuracy != "float64":
+            raise NotAvailableError(f"accuracy={self.accuracy!r} is not available yet; this version answers 'float64'")
         if not self.camera_far > self.camera_near:
             raise GeometryError(f"camera.far must be > camera.near = {self.camera_near:g}, got {self.camera_far:g}")
         # Within float32 drift; what is left of it is normalised away.
@@ -207,7 +208,7 @@ class Config:
 
 def _plain(value: Any) -> Any:
     """Lists of any kind as a tuple, so that a `Config` stays hashable."""
-    return value if isinstance(value, (bool, int, float, str)) else tuple(value)
+    return tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 
 
 def settings() -> tuple[Setting, ...]:

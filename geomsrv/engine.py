@@ -242,9 +242,9 @@ class Engine:
 
     def check(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> None:
         """Hand distances of (n, 2) rows of `world` to the cross-check, if it is on."""
-        rows = np.flatnonzero(answer.status != DistanceStatus.UNSUPPORTED)
-        if self.config.cross_check_mode == "off" or len(rows) == 0:
+        if self.config.cross_check_mode == "off":
             return
+        rows = np.flatnonzero(answer.status != DistanceStatus.UNSUPPORTED)
         pairs, shapes, ids = pairs[rows], [world.table.shapes[k] for k in world.shape.tolist()], world.ids
         # The cross-check wants what the query got and gave: everything in the frame of a.
         turn, origin = world.rotations[pairs[:, 0]], world.poses[pairs[:, 0], :3]

@@ -186,8 +186,7 @@ def listed_distances(
     else:
         rows = _mixed_distances(world, pairs, planar, penetration)
     unsupported = rows.status == DistanceStatus.UNSUPPORTED
-    if len(pairs):
-        count_kinds(world, pairs, counts)
+    _count(world, pairs, counts)
     return ListedDistances(
         status=rows.status,
         distance=rows.distance,
@@ -214,6 +213,16 @@ def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetrati
         for column in fields(DistanceRows)[1:]:
             getattr(whole, column.name)[chosen] = getattr(part, column.name)
     return whole
+
+
+def _count(world: World, pairs: IntArray, counts: Counter[str]) -> None:
+    """What `count_kinds` counts; a few pairs are counted faster one by one."""
+    if len(pairs) > 8:
+        count_kinds(world, pairs, counts)
+        return
+    for i, j in pairs.tolist():
+        a, b = sorted(world.table.shapes[world.shape[k]].kind for k in (i, j))
+        counts[f"narrow {a}-{b}"] += 1
 
 
 def _distinct(world: World, pairs: IntArray) -> None:
@@ -281,8 +290,7 @@ def _all_slide(world: World, pairs: IntArray) -> bool:
 def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, start: int) -> ListedContacts:
     _distinct(world, pairs)
     counts = Counter[str]()
-    if len(pairs):
-        count_kinds(world, pairs, counts)
+    _count(world, pairs, counts)
     rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon)
     none = np.zeros((0, 3))
     sets = [none if points is None else points for points in rows.points]

@@ -74,7 +74,7 @@ def uint64s(values: ArrayLike) -> array.array[int]:
 
 def _field(code: str, values: ArrayLike, dtype: Any) -> array.array[Any]:
     field = array.array(code)
-    field.frombytes(np.ascontiguousarray(values, dtype=dtype).data.cast("B") if np.size(values) else b"")
+    field.frombytes(np.ascontiguousarray(values, dtype=dtype).reshape(-1).view(np.uint8))
     return field
 
 
@@ -393,7 +393,7 @@ def set_cost(message: Any, cost: Cost) -> None:
     """Fill a geomsrv/Cost."""
     message.elapsed_ns, message.accuracy = cost.elapsed_ns, cost.accuracy
     message.stages = list(cost.counts)
-    message.counts = uint64s(list(cost.counts.values()))
+    message.counts = array.array("Q", cost.counts.values())
 
 
 def set_distances(message: Any, answer: PairDistances, pair_type: Callable[[], Any]) -> None:

@@ -252,7 +252,7 @@ class Handlers:
         )
         self.engine.check(world, np.concatenate([found, missing]), answer)
         _set_distances(response, answer, want)
-        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, near.message)
+        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, note=near.message)
 
     @_answered()
     def first_contact(self, request: Any, response: Any) -> None:
@@ -275,7 +275,7 @@ class Handlers:
             if request.select == BY_IDS:
                 _set_ids(response, world, pairs)
         _set_first_contacts(response, answer, order, want)
-        _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
+        _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, note=answer.message)
 
     @_answered()
     def cull_batch(self, request: Any, response: Any) -> None:
@@ -505,8 +505,9 @@ def _set_first_contacts(response: Any, answer: Any, order: IntArray, want: tuple
     convert.set_cost(response.cost, answer.cost)
 
 
-def _set_unsupported(response: Any, items: NDArray[np.bool_], *reasons: str) -> None:
-    """Status and message, where there is anything to say."""
-    text = "; ".join(filter(None, reasons))
-    if text or items.any():
-        response.status, response.message = UNSUPPORTED, text or "no kernel for some of the items"
+def _set_unsupported(response: Any, items: NDArray[np.bool_], *reasons: str, note: str = "") -> None:
+    """Status and message: reasons make the answer UNSUPPORTED, and so do items without one; a note does not."""
+    text = "; ".join(filter(None, (*reasons, note)))
+    unsupported = any(reasons) or items.any()
+    response.status = UNSUPPORTED if unsupported else OK
+    response.message = text or ("no kernel for some of the items" if unsupported else "")
