@@ -389,8 +389,7 @@ class Scene:
             changed = bool(added) or left.keys() != self._objects.keys() or allowed != self._allowed
             if changed:
                 self._objects, self._allowed = left | added, frozenset(allowed)
-                # An object that was removed and comes back later must not find its old state.
-                self._replaced |= added.keys() | (self._world.index.keys() - self._objects.keys())
+                self._replaced |= added.keys()
                 self._outdated = True
                 self._version += 1
             return self._version

@@ -204,6 +204,20 @@ def test_nearest_pair_of_many_looks_at_few():
     assert answer.cost.counts["candidates"] < n
 
 
+def test_nearest_pair_is_not_the_one_with_the_nearest_boxes():
+    """A hundred pairs of balls, diagonally apart, have nearer boxes than the one pair along an axis."""
+    ball = gs.Sphere(1.0)
+    objects = []
+    for k in range(100):
+        place = 10.0 * np.array([*divmod(k, 10), 0.0])
+        step = np.array([2.1, 2.1, 0.0]) if k != 37 else np.array([2.6, 0.0, 0.0])
+        objects += [gs.SceneObject(f"{k:02} {n}", ball, at(*(place + n * step))) for n in range(2)]
+    answer = scene_of(objects).nearest_pair()
+    assert (answer.ids_a, answer.ids_b) == (["37 0"], ["37 1"])
+    assert answer.distance[0] == pytest.approx(0.6, abs=1e-12)
+    assert answer.cost.counts["narrow sphere-sphere"] > 64
+
+
 def test_nearest_pair_without_a_pair():
     assert len(gs.Scene().nearest_pair()) == 0
     assert len(scene_of([gs.SceneObject("a", gs.Sphere(1.0))]).nearest_pair()) == 0
@@ -449,6 +463,9 @@ def test_rotation_is_never_treated_as_translation():
     answer = scene_of(solids).first_contacts(10.0)
     assert answer.status.tolist() == [ContactStatus.UNSUPPORTED]
     assert answer.unsupported == [("bar", "near", "first contact of moving solids (box-sphere) is unsupported")]
+    # Turning alike is not being at rest relative to each other: each turns about its own origin.
+    alike = [gs.SceneObject(o.id, o.shape, o.pose, spin) for o in solids]
+    assert scene_of(alike).first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
 
 
 def test_solids_touch_now_or_never_or_are_unsupported():
@@ -615,14 +632,19 @@ def test_swept_boxes_hold_everything_passed_through():
     np.testing.assert_array_equal(np.isinf(forever.lower), speed < 0.0)
 
 
+@pytest.mark.parametrize("near", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 1e4])
-def test_intervals_cover_the_rounding_of_poses(scale):
+def test_intervals_cover_the_rounding_of_poses(scale, near):
     """Points on long arms: their distance is known exactly from the two rotation matrices, taken literally."""
     rng = np.random.default_rng(21)
     widths = []
     for _ in range(60):
-        a, b = rng.normal(size=(2, 3))
+        a, b = rng.normal(size=(2, 3)) * (scale if near else 1.0)
         poses = random_pose(rng, scale), random_pose(rng, scale)
+        if near:
+            # So placed that the points all but meet: all there is of their distance is rounding.
+            turns = [gs._validate.rotation_matrices(pose[None, 3:])[0] for pose in poses]
+            poses[1][:3] = poses[0][:3] + turns[0] @ a - turns[1] @ b
         objects = [gs.SceneObject(n, gs.Point(p), q) for n, p, q in zip("ab", (a, b), poses, strict=True)]
         scene = scene_of(objects)
         world, answer = scene.world, scene.distances(INF)
@@ -846,6 +868,15 @@ def test_other_frames_are_transformed_or_refused_by_name():
     for name in "cd":
         np.testing.assert_array_equal(scene[name].pose, at(1.0, 0.0, 0.0))
         np.testing.assert_array_equal(scene[name].twist, push)
+    # Any rotation, by matrices.
+    rng = np.random.default_rng(4)
+    known["arm"], pose, twist = random_pose(rng), random_pose(rng), rng.normal(size=6)
+    scene.apply(gs.SceneUpdate(add=[gs.SceneObject("f", ball, pose, twist, frame="arm")]))
+    turns = [gs._validate.rotation_matrices(p[None, 3:])[0] for p in (known["arm"], pose, scene["f"].pose)]
+    np.testing.assert_allclose(turns[2], turns[0] @ turns[1], atol=1e-14)
+    np.testing.assert_allclose(scene["f"].pose[:3], turns[0] @ pose[:3] + known["arm"][:3], atol=1e-14)
+    np.testing.assert_allclose(scene["f"].twist[:3], turns[0] @ twist[:3], atol=1e-14)
+    np.testing.assert_allclose(scene["f"].twist[3:], turns[0] @ twist[3:], atol=1e-14)
     known["bad"] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0)
     for frame in ("nowhere", "bad"):
         with pytest.raises(gs.SceneError, match=f"frame '{frame}'"):
