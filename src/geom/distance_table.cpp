@@ -182,6 +182,19 @@ CoreSeparation solve_in_range(LocalFrame frame, Place place_both, Magnitude magn
     return out;
 }
 
+/// Half spaces multiply lengths by unit vectors only: any unit will do in which nothing overflows.
+template <class Place, class Magnitude, class Solve>
+CoreSeparation solve_unbounded(LocalFrame frame, Place place_both, Magnitude magnitude, Solve solve) {
+    constexpr double kHuge = 0x1p900;
+    if (!(magnitude() > kHuge)) {
+        return solve(place_both(frame));
+    }
+    frame.scale = 0x1p-300;
+    CoreSeparation out = solve(place_both(frame));
+    unscale(out, frame.scale);
+    return out;
+}
+
 }  // namespace
 
 bool supported_pair(ShapeKind a, ShapeKind b) { return kernel_of(std::min(a, b), std::max(a, b)) != kUnsup; }
@@ -195,15 +208,16 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
     const bool anchored_b = a.kind == ShapeKind::half_space && b.kind != ShapeKind::half_space;
     LocalFrame frame;
     frame.origin = anchored_b ? X_ab * middle_of(b) : middle_of(a);
-    CoreSeparation core = solve_in_range(
-        frame,
-        [&](const LocalFrame& f) {
-            return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
-        },
-        [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); },
-        [&](const LocalPair& pair) {
-            return flip ? kernel(pair.b, pair.a, penetration) : kernel(pair.a, pair.b, penetration);
-        });
+    const auto place_both = [&](const LocalFrame& f) {
+        return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
+    };
+    const auto solve = [&](const LocalPair& pair) {
+        return flip ? kernel(pair.b, pair.a, penetration) : kernel(pair.a, pair.b, penetration);
+    };
+    const auto magnitude = [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); };
+    const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
+    CoreSeparation core = unbounded ? solve_unbounded(frame, place_both, magnitude, solve)
+                                    : solve_in_range(frame, place_both, magnitude, solve);
     if (flip) {
         swap_bodies(core);
     }

@@ -9,10 +9,11 @@ namespace geomsrv {
 
 namespace {
 
-// Gap along the normalised cross product of two generators g, h at an angle with sine s, times S / s: the
-// product is off by 3 u |g| |h|, which tilts every other generator's part; dot products and sums add 9 u, all
-// without 1 / s.
-constexpr double kAxisError = 12 * kUnitRoundoff;
+// Gap along the normalised cross product of two generators g, h at an angle with sine s, times S / s.  The
+// product is off by 2 sqrt(2) u |g| |h|: that tilts the part of every other generator, and changes the length
+// divided by, 6 u together; dot products (3 u), sums (4 u), the length (4 u), the middle and the division (2
+// u) come without 1 / s.
+constexpr double kAxisError = 20 * kUnitRoundoff;
 
 // Generators that enclose less than this count as parallel.  Then the facet they span is as thin as rounding;
 // turning the shorter one onto the longer moves no point by more than its length times the sine, which is

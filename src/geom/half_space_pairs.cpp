@@ -15,6 +15,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A normal is normalised by the caller in doubles; dividing by its length leaves 4 u.
 constexpr double kUnitError = 4 * kUnitRoundoff;
 
+// What a handful of operations lose where they end below the normal range.
+constexpr double kUnderflow = 16 * std::numeric_limits<double>::denorm_min();
+
 /// A point of both, where they are not known to be parted: on the plane of a, moved along it until it is in
 /// b.
 Vec3 common_point(const PlacedHalfSpace& a, const PlacedHalfSpace& b) {
@@ -39,8 +42,9 @@ CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b) {
     const Extreme bottom = lowest(a, up);
     const double level = b.offset / length;
     const double value = bottom.value - level;
-    const double error = (kSupportError + kUnitError + 2 * b.normal_error) * a.reach + 2 * b.offset_error +
-                         a.error + kUnitError * (std::abs(level) + std::abs(value));
+    const double error = (kSupportError + kUnitError + 2 * b.normal_error) * a.reach + a.error +
+                         2 * b.offset_error + (kUnitError + 2 * b.normal_error) * std::abs(level) +
+                         kUnitError * std::abs(value) + kUnderflow;
     CoreSeparation out;
     out.value = value;
     out.lower = value - error;
@@ -78,7 +82,7 @@ CoreSeparation half_space_half_space(const PlacedHalfSpace& a, const PlacedHalfS
     }
     const double value = -level_b - level_a;
     const double error = 2 * (a.offset_error + b.offset_error) +
-                         kUnitError * (std::abs(level_a) + std::abs(level_b) + std::abs(value));
+                         kUnitError * (std::abs(level_a) + std::abs(level_b) + std::abs(value)) + kUnderflow;
     out.value = value;
     out.upper = value + error;
     out.lower = value - error;

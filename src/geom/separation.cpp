@@ -39,7 +39,7 @@ CoreSeparation certify_apart(const Core& a, const Core& b, Vec3 normal, Vec3 poi
     const Bounds bounds = bounds_of(a, b, normal, length);
     CoreSeparation out;
     // Where even the sign is in doubt, the smaller estimate: touching counts as contact.
-    out.value = bounds.lower > 0.0 ? length : std::min(length, bounds.gap);
+    out.value = bounds.lower > 0.0 ? std::max(length, bounds.lower) : std::min(length, bounds.gap);
     out.lower = bounds.lower;
     out.upper = bounds.upper;
     out.point_a = point_a;
@@ -63,7 +63,7 @@ CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 poin
     out.point_a = point_a;
     out.point_b = point_b;
     out.normal = normal;
-    out.converged = upper - bounds.gap <= 2 * kMeetingGap * bounds.size;
+    out.converged = upper - bounds.gap <= kDeepMeetingGap * bounds.size;
     out.outcome = judge(out.lower, out.upper, bounds);
     return out;
 }

@@ -90,8 +90,12 @@ inline constexpr double kMemberError = kVertexError + 9 * kUnitRoundoff;
 // so that waiting for less could wait for ever.
 inline constexpr double kMeetingGap = 16 * kUnitRoundoff;
 
-// Widest interval called ok, times S: the meeting gap, the errors of both bounds (7 + 12 u) and of the
-// vertices.
+// The proof that no facet is nearer costs more roundings: of a cross product, its length and the plane's
+// offset.
+inline constexpr double kDeepMeetingGap = 3 * kMeetingGap;
+
+// Widest interval called ok, times S: the wider of the meeting gaps and the errors of both bounds (7 + 12 + 6
+// u).  The errors of the vertices themselves come on top.
 inline constexpr double kPromisedWidth = 80 * kUnitRoundoff;
 
 /// Bounds from a direction and a pair of points of the cores.
