@@ -406,7 +406,8 @@ class Boxes:
     def corners(self, origin: FloatArray | None = None) -> FloatArray:
         """(n, 8, 3) float64: corners relative to `origin` (n, 3), rounded; by default the world's."""
         center = self.center if origin is None else self.center - origin
-        return center[:, None, :] + np.einsum("ck,nk,nkd->ncd", CORNER_SIGNS, self.half_extents, self.axes)
+        arms: FloatArray = np.einsum("ck,nk,nkd->ncd", CORNER_SIGNS, self.half_extents, self.axes)
+        return center[:, None, :] + arms
 
 
 class _Ragged:
