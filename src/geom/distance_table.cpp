@@ -185,11 +185,14 @@ CoreSeparation solve_in_range(LocalFrame frame, Place place_both, Magnitude magn
 /// Half spaces multiply lengths by unit vectors only: any unit will do in which nothing overflows.
 template <class Place, class Magnitude, class Solve>
 CoreSeparation solve_unbounded(LocalFrame frame, Place place_both, Magnitude magnitude, Solve solve) {
+    // Products of two parts of a split number (two_product) overflow from 2^996 on; 2^-300 brings 2^1023 far
+    // below.
     constexpr double kHuge = 0x1p900;
+    constexpr double kMuchSmaller = 0x1p-300;
     if (!(magnitude() > kHuge)) {
         return solve(place_both(frame));
     }
-    frame.scale = 0x1p-300;
+    frame.scale = kMuchSmaller;
     CoreSeparation out = solve(place_both(frame));
     unscale(out, frame.scale);
     return out;

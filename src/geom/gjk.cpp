@@ -40,6 +40,7 @@ struct Arithmetic<double> {
 template <>
 struct Arithmetic<DoubleDouble> {
     using Vec = WideVec3;
+    // The same with the roundings of double-double.
     static constexpr double kSideError = 128 * kWideRoundoff;
     static Vec from(Vec3 v) { return widen(v); }
     static Vec3 to_vec3(Vec v) { return narrow(v); }

@@ -32,6 +32,7 @@ constexpr double kDifferenceError = 2 * kVertexError + 2 * kUnitRoundoff;
 // sqrt(2) u of the product of their lengths; the offset of the plane turns with it about the vertex it is
 // measured at.
 constexpr double kPlaneError = 6 * kUnitRoundoff;
+
 // In double-double next to nothing remains but the rounding of the result.
 constexpr double kWidePlaneError = 2 * kUnitRoundoff;
 

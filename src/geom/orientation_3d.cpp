@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "geom/double_double.hpp"
+#include "geom/rounding.hpp"
 
 namespace geomsrv {
 
@@ -120,7 +121,6 @@ constexpr DoubleDouble rounded(const Expansion<A>& a) {
 
 int orientation_3d(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
     // Relative error of the determinant in terms of its permanent: Shewchuk 1997, section 4.3, (7 + 56 u) u.
-    constexpr double kUnitRoundoff = 0x1p-53;
     constexpr double kOrientationError = (7.0 + 56.0 * kUnitRoundoff) * kUnitRoundoff;
     const Vec3 u = b - a;
     const Vec3 v = c - a;

@@ -118,8 +118,11 @@ void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& fr
 double largest_of(Vec3 v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 double safe_norm(Vec3 v) {
+    // Squares of numbers between these neither overflow nor lose bits.
+    constexpr double kSmallest = 0x1p-400;
+    constexpr double kLargest = 0x1p400;
     const double largest = largest_of(v);
-    if (largest == 0.0 || (largest > 0x1p-400 && largest < 0x1p400)) {
+    if (largest == 0.0 || (largest > kSmallest && largest < kLargest)) {
         return norm(v);
     }
     if (!(largest <= std::numeric_limits<double>::max())) {
