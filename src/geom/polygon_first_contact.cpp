@@ -214,9 +214,9 @@ GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Wind
             const Lanes slowest = Lanes::load(p.work[1] + k);
             const Lanes closing = Lanes::load(p.work[2] + k);
             // most / slowest >= enter if it approaches for certain; else it may begin at any time.
-            const LaneMask begins = (zero < most) & (window.enter * slowest <= most);
+            const LaneMask begins = (zero < most) & (Lanes(window.enter) * slowest <= most);
             // most / slowest <= leave, both negative.  Sliding within the slack does not end a contact.
-            const LaneMask ends = (closing < zero) & (window.leave * slowest <= most);
+            const LaneMask ends = (closing < zero) & (Lanes(window.leave) * slowest <= most);
             if (!any(begins | ends)) {
                 continue;
             }
@@ -283,6 +283,27 @@ Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
     return result;
 }
 
+/// The numbers of one axis taken literally, without slack for rounding of the input.
+struct LiteralAxis {
+    double gap, rate, gap_error, rate_error;
+
+    /// Both known to about 45 bits, so that their quotient is good enough as it is.
+    [[nodiscard]] bool is_sharp() const {
+        return gap_error < kSharp * std::fabs(gap) && rate_error < kSharp * std::fabs(rate);
+    }
+    static constexpr double kSharp = 0x1p-46;
+};
+
+LiteralAxis literal(const PolygonPair& pair, AxisOf axis, const Motion& motion, const Slacks& slacks) {
+    const PairedPolygon& p = pair.side(axis.side);
+    const Vec2 direction = p.axis(axis.index);
+    const double along_x = direction.x * motion.velocity.x;
+    const double along_y = direction.y * motion.velocity.y;
+    return {p.gap[axis.index], approach_of(axis.side) * (along_x + along_y),
+            slacks.gap_rounding * (std::fabs(direction.x) + std::fabs(direction.y)) + kPairUnderflow,
+            kRateError * (std::fabs(along_x) + std::fabs(along_y)) + kPairUnderflow};
+}
+
 Enclosed enclosed_rate(AxisOf axis, const ExactVec2& direction, const Motion& motion) {
     Enclosed rate = enclosed_dot(direction, motion.exact);
     if (axis.side == 0) {
@@ -296,7 +317,6 @@ struct Entry {
     double lower = 0.0;
     double upper = 0.0;
     AxisOf axis;
-    std::size_t vertex = 0;  ///< of the other polygon, lowest along the axis
 };
 
 /// The axis along which contact begins last, and when, for the given numbers as they are.
@@ -307,37 +327,50 @@ Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& 
                    std::span<const AxisOf> axes) {
     Entry entry;
     for (const AxisOf axis : axes) {
-        const ExactVec2 direction = pair.exact_axis(axis);
-        const std::size_t vertex = pair.lowest(axis);
-        const Enclosed gap = pair.enclosed_gap(axis, direction, vertex);
-        const bool open = gap.value.hi > gap.error;
-        if (!open && (-gap.value.hi > gap.error || pair.sign_of_gap(axis, vertex) <= 0)) {
-            continue;
-        }
-        const Timed close = closing_time(gap, enclosed_rate(axis, direction, motion));
-        entry.upper = std::max(entry.upper, close.upper);
-        const AxisNumbers<double> at = numbers(pair, axis, motion, slacks);
-        const bool sliding = at.gap <= at.gap_slack && at.rate <= at.rate_slack;
-        if (sliding) {
-            continue;
+        const LiteralAxis at = literal(pair, axis, motion, slacks);
+        Timed close;
+        if (at.is_sharp() && at.gap > 0.0 && at.rate > 0.0) {
+            close = closing_time({{at.gap, 0.0}, at.gap_error}, {{at.rate, 0.0}, at.rate_error});
+        } else {
+            // Near contact, or grazing: most digits of the gap or of the rate cancel.
+            const ExactVec2 direction = pair.exact_axis(axis);
+            const std::size_t vertex = pair.lowest(axis);
+            const Enclosed gap = pair.enclosed_gap(axis, direction, vertex);
+            const bool open = gap.value.hi > gap.error;
+            if (!open && (-gap.value.hi > gap.error || pair.sign_of_gap(axis, vertex) <= 0)) {
+                continue;
+            }
+            close = closing_time(gap, enclosed_rate(axis, direction, motion));
+            entry.upper = std::max(entry.upper, close.upper);
+            const AxisNumbers<double> slack = numbers(pair, axis, motion, slacks);
+            const bool sliding = slack.gap <= slack.gap_slack && slack.rate <= slack.rate_slack;
+            if (sliding) {
+                continue;
+            }
         }
         entry.lower = std::max(entry.lower, close.lower);
+        entry.upper = std::max(entry.upper, close.upper);
         if (entry.time < close.nominal) {
             entry.time = close.nominal;
             entry.axis = axis;
-            entry.vertex = vertex;
         }
     }
     return entry;
 }
 
 /// When they part.
-double earliest_exit(const PolygonPair& pair, const Motion& motion, std::span<const AxisOf> axes) {
+double earliest_exit(const PolygonPair& pair, const Motion& motion, const Slacks& slacks,
+                     std::span<const AxisOf> axes) {
     double exit = kInfinity;
     for (const AxisOf axis : axes) {
-        const ExactVec2 direction = pair.exact_axis(axis);
-        const Enclosed gap = pair.enclosed_gap(axis, direction, pair.lowest(axis));
-        exit = std::min(exit, quotient(gap.value, enclosed_rate(axis, direction, motion).value).hi);
+        const LiteralAxis at = literal(pair, axis, motion, slacks);
+        double time = at.gap / at.rate;
+        if (!at.is_sharp()) {
+            const ExactVec2 direction = pair.exact_axis(axis);
+            const Enclosed gap = pair.enclosed_gap(axis, direction, pair.lowest(axis));
+            time = quotient(gap.value, enclosed_rate(axis, direction, motion).value).hi;
+        }
+        exit = std::min(exit, time);
     }
     return std::max(exit, 0.0);
 }
@@ -366,7 +399,7 @@ struct ContactMarks {
 /// A face is an edge with its collinear neighbours, or a vertex.  The ends of the common part are always
 /// vertices, of one polygon or of the other.
 ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const Slacks& slacks, AxisOf axis,
-                           std::size_t lowest_vertex, double moment) {
+                           double moment) {
     const PairedPolygon& own = pair.side(axis.side);
     const Vec2 outward_axis = own.axis(axis.index);
     const Vec2 along = {-outward_axis.y, outward_axis.x};
@@ -383,7 +416,7 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
     };
     const auto [own_low, own_high] = ends(axis.side, pair.highest(axis, slacks.heights()));
     const auto [other_low, other_high] =
-        ends(1 - axis.side, pair.lowest(axis, lowest_vertex, slacks.heights()));
+        ends(1 - axis.side, pair.lowest(axis, pair.lowest(axis), slacks.heights()));
     const Mark low = own_low.place < other_low.place ? other_low : own_low;
     const Mark high = other_high.place < own_high.place ? other_high : own_high;
 
@@ -414,7 +447,7 @@ bool has_interior(const PolygonPair& pair, int side, const Slacks& slacks) {
     // The longest edge is at least half as long as the ring, so a flat ring has no height over it.
     double lowest = 0.0;
     for (std::size_t k = 0; k < p.edges; ++k) {
-        lowest = std::min(lowest, dot(p.axis(longest), p.local(k)) - p.own[longest]);
+        lowest = std::min(lowest, dot(p.axis(longest), p.local(k)) - p.own(longest));
     }
     const double size = length(longest);
     return -lowest >
@@ -459,12 +492,11 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
 
     const Candidates candidates = candidates_of(pair_, window, entries_.data(), exits_.data());
     const Entry entry = latest_entry(pair_, motion, slacks, {entries_.data(), candidates.entries});
-    const double exit = earliest_exit(pair_, motion, {exits_.data(), candidates.exits});
+    const double exit = earliest_exit(pair_, motion, slacks, {exits_.data(), candidates.exits});
 
     FirstContact result{};
     double moment = 0.0;
     AxisOf axis = entry.axis;
-    std::size_t lowest_vertex = entry.vertex;
     if (window.apart) {
         // Grazing within the slack may nominally begin after it ends, or after t_max.
         moment = std::min({entry.time.hi, window.leave, seconds.inverse(t_max)});
@@ -478,7 +510,6 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         const bool solid = window.deep && has_interior(pair_, 0, slacks) && has_interior(pair_, 1, slacks);
         result.status = solid ? ContactStatus::overlapping : ContactStatus::touching;
         axis = pair_.widest_gap();
-        lowest_vertex = pair_.lowest(axis);
     }
     result.time_upper =
         std::max(std::min(seconds.up(std::min(entry.upper, window.leave)), t_max), result.time);
@@ -495,7 +526,7 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         result.points = overlap_.of(pair_, slacks.heights());
         return result;
     }
-    const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, lowest_vertex, moment);
+    const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
     const auto moved = [&](const Mark& mark) {
         return pair_.side(mark.side).ring[mark.vertex] + result.time * (mark.side == 0 ? a : b).velocity;
     };

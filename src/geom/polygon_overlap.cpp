@@ -61,8 +61,8 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
             const double level = pair.gap_error() * size + kPairUnderflow +
                                  std::min(slack.noise * (size + pair.reach()), slack.limit * size);
-            const double from = dot(q.axis(k), p.local(i)) - q.own[k];
-            const double to = dot(q.axis(k), p.local(end)) - q.own[k];
+            const double from = dot(q.axis(k), p.local(i)) - q.own(k);
+            const double to = dot(q.axis(k), p.local(end)) - q.own(k);
             if (from > level && to > level) {
                 leave = -1.0;
             } else if (from > level && from / (from - to) > enter) {

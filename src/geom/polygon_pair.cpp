@@ -19,14 +19,13 @@ constexpr double kSmallestReach = 0x1p-200;
 constexpr double kLargestReach = 0x1p200;
 
 // All pairs of axis and vertex are projected up to this many; beyond it supports are found by walking.
-// Measured: the walk costs about as much as 16 x 16 projections, and needs more than twice that to make up
-// for its larger error.
 constexpr std::size_t kLargestProduct = 1024;
 
 // Gain of height along an edge that is certainly not rounding: two relatively exact edges, products, sum.
 constexpr double kHeightError = 6.0 * kRoundoff;
 
 constexpr std::size_t kLanes = Lanes::kCount;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
@@ -44,190 +43,171 @@ GEOMSRV_INLINE PointLanes load_points(const Vec2* from) {
             Lanes(__builtin_shufflevector(first.v, second.v, 1, 3, 5, 7))};
 }
 
-/// Local coordinates of a ring; returns the largest of them.
-GEOMSRV_INLINE double place_vertices(const PairedPolygon& p, Vec2 origin) {
-    const std::size_t n = p.ring.size();
-    const Vec2* const ring = p.ring.data();
-    if (n < kLanes) {
-        double largest_part = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
-            p.x[i] = ring[i].x - origin.x;
-            p.y[i] = ring[i].y - origin.y;
-            largest_part = greater(largest_part, greater(magnitude(p.x[i]), magnitude(p.y[i])));
-        }
-        return largest_part;
-    }
-    Lanes largest_parts = 0.0;
-    const auto place = [&](std::size_t i) __attribute__((always_inline)) {
-        const PointLanes points = load_points(ring + i);
-        const Lanes x = points.x - origin.x;
-        const Lanes y = points.y - origin.y;
-        x.store(p.x + i);
-        y.store(p.y + i);
-        largest_parts = greater(largest_parts, greater(magnitude(x), magnitude(y)));
-    };
-    for (std::size_t i = 0; i + kLanes < n; i += kLanes) {
-        place(i);
-    }
-    place(n - kLanes);  // the last block may overlap the one before
-    return greatest(largest_parts);
-}
-
-/// Outward normals of the edges.
-GEOMSRV_INLINE void place_edges(const PairedPolygon& p) {
-    const std::size_t n = p.ring.size();
-    const Vec2* const ring = p.ring.data();
-    const std::size_t inner = n - 1;  // edges that need not wrap round
-    if (inner < kLanes) {
-        for (std::size_t i = 0; i < inner; ++i) {
-            p.dx[i] = ring[i + 1].y - ring[i].y;
-            p.dy[i] = ring[i].x - ring[i + 1].x;
-        }
-    } else {
-        const auto place = [&](std::size_t i) __attribute__((always_inline)) {
-            const PointLanes from = load_points(ring + i);
-            const PointLanes to = load_points(ring + i + 1);
-            (to.y - from.y).store(p.dx + i);
-            (from.x - to.x).store(p.dy + i);
-        };
-        for (std::size_t i = 0; i + kLanes < inner; i += kLanes) {
-            place(i);
-        }
-        place(inner - kLanes);
-    }
-    p.dx[inner] = ring[0].y - ring[inner].y;
-    p.dy[inner] = ring[inner].x - ring[0].x;
-}
-
-struct EdgeCheck {
-    bool strict = true;     ///< every turn is certainly to the left
+struct Placed {
+    double reach = 0.0;     ///< largest |local coordinate|
+    bool strict = false;    ///< every turn is certainly to the left
     bool has_tips = false;  ///< some turn exceeds 120 degrees
 };
 
-constexpr bool is_tip(Vec2 edge, Vec2 next) {
-    const double forward = dot(edge, next);
-    // cos(turn) < -1/2, squared.
-    return forward < 0.0 && 4.0 * forward * forward > dot(edge, edge) * dot(next, next);
-}
+/// How given coordinates become local ones.  Plain ones take no factors, which costs half the time.
+template <bool kScaled>
+struct Units {
+    double before = 1.0;
+    double scale = 1.0;
 
-GEOMSRV_INLINE EdgeCheck check_edges(const PairedPolygon& p) {
-    const std::size_t n = p.ring.size();
-    // The ring of edges goes on into the padding, so that turns need no index arithmetic.
-    for (std::size_t i = 0, wrapped = 0; i <= kLanes; ++i) {
-        p.dx[n + i] = p.dx[wrapped];
-        p.dy[n + i] = p.dy[wrapped];
-        wrapped = wrapped + 1 < n ? wrapped + 1 : 0;
+    [[nodiscard]] GEOMSRV_INLINE Lanes difference(const Lanes& to, const Lanes& from) const {
+        if constexpr (kScaled) {
+            return Lanes(scale) * (Lanes(before) * to - Lanes(before) * from);
+        }
+        return to - from;
     }
+};
+
+/// Local vertices and outward normals of a ring.  One pass without branches: loops over so few vertices cost
+/// as much by their unpredictable ends as by their work.
+template <bool kScaled>
+GEOMSRV_INLINE Placed place_ring(const PairedPolygon& p, Vec2 origin, Units<kScaled> units) {
+    const std::size_t n = p.ring.size();
+    Lanes reach = 0.0;
     LaneMask strict = Lanes(0.0) <= Lanes(0.0);
     LaneMask sharp = ~strict;
     for (std::size_t i = 0; i < n; i += kLanes) {
-        const Lanes x = Lanes::load(p.dx + i);
-        const Lanes y = Lanes::load(p.dy + i);
-        const Lanes next_x = Lanes::load(p.dx + i + 1);
-        const Lanes next_y = Lanes::load(p.dy + i + 1);
-        const Lanes left = x * next_y;
-        const Lanes right = y * next_x;
-        const Lanes bound = kCrossError * (magnitude(left) + magnitude(right)) + kCrossUnderflow;
-        strict = strict & (bound < left - right);  // the normals turn as the edges do
-        const Lanes forward = x * next_x + y * next_y;
-        const Lanes lengths = (x * x + y * y) * (next_x * next_x + next_y * next_y);
-        sharp = sharp | ((forward < 0.0) & (lengths < 4.0 * forward * forward));
+        const PointLanes v = load_points(p.around + i);
+        const PointLanes next = load_points(p.around + i + 1);
+        const PointLanes after = load_points(p.around + i + 2);
+        const Lanes x = units.difference(v.x, origin.x);
+        const Lanes y = units.difference(v.y, origin.y);
+        reach = greater(reach, greater(magnitude(x), magnitude(y)));
+        // The normals of two edges turn as the edges do.
+        const Lanes dx = units.difference(next.y, v.y);
+        const Lanes dy = units.difference(v.x, next.x);
+        const Lanes next_dx = units.difference(after.y, next.y);
+        const Lanes next_dy = units.difference(next.x, after.x);
+        const Lanes left = dx * next_dy;
+        const Lanes right = dy * next_dx;
+        const Lanes bound =
+            Lanes(kCrossError) * (magnitude(left) + magnitude(right)) + Lanes(kCrossUnderflow);
+        strict = strict & (bound < left - right);
+        // cos(turn) < -1/2, squared.
+        const Lanes forward = dx * next_dx + dy * next_dy;
+        const Lanes lengths = (dx * dx + dy * dy) * (next_dx * next_dx + next_dy * next_dy);
+        sharp = sharp | ((forward < Lanes(0.0)) & (lengths < Lanes(4.0) * forward * forward));
+        x.store(p.x + i);
+        y.store(p.y + i);
+        dx.store(p.dx + i);
+        dy.store(p.dy + i);
     }
-    return {all(strict), any(sharp)};
+    return {greatest(reach), all(strict), any(sharp)};
 }
 
-/// Own supports of all axes that start at their edge's first vertex.
-GEOMSRV_INLINE void place_own(const PairedPolygon& p) {
-    for (std::size_t k = 0; k < p.edges; k += kLanes) {
-        (Lanes::load(p.dx + k) * Lanes::load(p.x + k) + Lanes::load(p.dy + k) * Lanes::load(p.y + k))
-            .store(p.own + k);
-    }
+GEOMSRV_WIDE_CLONES Placed place_plain(const PairedPolygon& p, Vec2 origin) {
+    return place_ring(p, origin, Units<false>{});
 }
 
-/// As place_vertices and place_edges, for extreme coordinates.
-double place_scaled(const PairedPolygon& p, Vec2 origin, double before, double scale) {
-    double largest_part = 0.0;
+Placed place_scaled(const PairedPolygon& p, Vec2 origin, Units<true> units) {
+    return place_ring(p, origin, units);
+}
+
+/// The ring, going on past its end for as long as a block of lanes and two edges reach.
+void copy_around(const PairedPolygon& p) {
+    constexpr std::size_t kBeyond = kLanes + 1;
     const std::size_t n = p.ring.size();
-    const auto apart = [=](double to, double from) { return scale * (before * to - before * from); };
-    for (std::size_t i = 0; i < n; ++i) {
-        const Vec2 v = p.ring[i];
-        const Vec2 next = p.ring[p.next(i)];
-        p.x[i] = apart(v.x, origin.x);
-        p.y[i] = apart(v.y, origin.y);
-        p.dx[i] = apart(next.y, v.y);
-        p.dy[i] = apart(v.x, next.x);
-        largest_part = std::max({largest_part, std::fabs(p.x[i]), std::fabs(p.y[i])});
+    std::copy(p.ring.begin(), p.ring.end(), p.around);
+    if (n >= kBeyond) {
+        std::copy_n(p.ring.begin(), kBeyond, p.around + n);
+    } else {
+        for (std::size_t i = n; i < n + kBeyond; ++i) {
+            p.around[i] = p.around[i - n];
+        }
     }
-    return largest_part;
 }
 
-/// Writes the tip axes behind those of the edges; false if there are more than a convex ring can have.
-bool place_tips(PairedPolygon& p) {
+/// Puts an axis that rests on a vertex behind the others.
+void append_axis(PairedPolygon& p, Vec2 axis, std::size_t vertex) {
+    p.tip[p.axes - p.edges] = vertex;
+    p.x[p.axes] = p.x[vertex];
+    p.y[p.axes] = p.y[vertex];
+    p.dx[p.axes] = axis.x;
+    p.dy[p.axes] = axis.y;
+    ++p.axes;
+}
+
+/// Adds the tips; false if there are more than a convex ring can have.
+bool append_tips(PairedPolygon& p) {
     // Two, or three by rounding if the ring is an equilateral triangle.
     constexpr std::size_t kMost = 3;
-    std::array<Vec2, kMost> outward_axes;
     const std::size_t n = p.edges;
-    std::size_t count = 0;
     for (std::size_t i = 0; i < n; ++i) {
         // Normals turned by 90 degrees are the edges before and behind vertex i.
         const Vec2 before{-p.dy[p.previous(i)], p.dx[p.previous(i)]};
         const Vec2 behind{-p.dy[i], p.dx[i]};
-        if (n > 2 && !is_tip(before, behind)) {
+        const double forward = dot(before, behind);
+        const bool is_tip =
+            forward < 0.0 && 4.0 * forward * forward > dot(before, before) * dot(behind, behind);
+        if (n > 2 && !is_tip) {
             continue;
         }
-        if (count == kMost) {
+        if (p.axes == n + kMost) {
             return false;
         }
-        outward_axes[count] = unit(before) - unit(behind);
-        p.tip[count] = i;
-        ++count;
+        append_axis(p, unit(before) - unit(behind), i);
     }
-    for (std::size_t k = 0; k < count; ++k) {
-        p.dx[n + k] = outward_axes[k].x;
-        p.dy[n + k] = outward_axes[k].y;
-        p.own[n + k] = dot(outward_axes[k], p.local(p.tip[k]));
-    }
-    p.axes = n + count;
     return true;
 }
 
-/// Axis k of p projected on all vertices of q.
-GEOMSRV_INLINE void project_all(const PairedPolygon& p, const PairedPolygon& q) {
-    const std::size_t n = q.ring.size();
-    const std::size_t end = padded(p.axes);
-    std::size_t k = 0;
-    for (; k + 2 * kLanes <= end; k += 2 * kLanes) {
-        // Two blocks at a time share the loads of the vertices.
-        const Lanes dx0 = Lanes::load(p.dx + k);
-        const Lanes dy0 = Lanes::load(p.dy + k);
-        const Lanes dx1 = Lanes::load(p.dx + k + kLanes);
-        const Lanes dy1 = Lanes::load(p.dy + k + kLanes);
-        Lanes low0 = dx0 * q.x[0] + dy0 * q.y[0];
-        Lanes low1 = dx1 * q.x[0] + dy1 * q.y[0];
-        for (std::size_t j = 1; j < n; ++j) {
-            const Lanes height0 = dx0 * q.x[j] + dy0 * q.y[j];
-            const Lanes height1 = dx1 * q.x[j] + dy1 * q.y[j];
-            low0 = lesser(height0, low0);
-            low1 = lesser(height1, low1);
-        }
-        (low0 - Lanes::load(p.own + k)).store(p.gap + k);
-        (low1 - Lanes::load(p.own + k + kLanes)).store(p.gap + k + kLanes);
+/// Blocks of axes of p projected on all vertices of q; several blocks share the loads of the vertices.
+template <std::size_t kBlocks>
+GEOMSRV_INLINE void project_blocks(const PairedPolygon& p, const PairedPolygon& q, std::size_t first) {
+    std::array<Lanes, kBlocks> dx;
+    std::array<Lanes, kBlocks> dy;
+    std::array<Lanes, kBlocks> low;
+    for (std::size_t i = 0; i < kBlocks; ++i) {
+        dx[i] = Lanes::load(p.dx + first + i * kLanes);
+        dy[i] = Lanes::load(p.dy + first + i * kLanes);
+        low[i] = kInfinity;
     }
-    for (; k < end; k += kLanes) {
-        const Lanes dx = Lanes::load(p.dx + k);
-        const Lanes dy = Lanes::load(p.dy + k);
-        Lanes low = dx * q.x[0] + dy * q.y[0];
-        for (std::size_t j = 1; j < n; ++j) {
-            const Lanes height = dx * q.x[j] + dy * q.y[j];
-            low = lesser(height, low);
+    for (std::size_t j = 0; j < q.ring.size(); ++j) {
+        const Lanes x = q.x[j];
+        const Lanes y = q.y[j];
+        for (std::size_t i = 0; i < kBlocks; ++i) {
+            low[i] = lesser(dx[i] * x + dy[i] * y, low[i]);
         }
-        (low - Lanes::load(p.own + k)).store(p.gap + k);
+    }
+    for (std::size_t i = 0; i < kBlocks; ++i) {
+        const std::size_t k = first + i * kLanes;
+        (low[i] - (dx[i] * Lanes::load(p.x + k) + dy[i] * Lanes::load(p.y + k))).store(p.gap + k);
     }
 }
 
-GEOMSRV_INLINE std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
+GEOMSRV_INLINE void project_all(const PairedPolygon& p, const PairedPolygon& q) {
+    const std::size_t end = padded(p.axes);
+    std::size_t k = 0;
+    for (; k + 4 * kLanes <= end; k += 4 * kLanes) {
+        project_blocks<4>(p, q, k);
+    }
+    switch ((end - k) / kLanes) {
+        case 3:
+            project_blocks<3>(p, q, k);
+            break;
+        case 2:
+            project_blocks<2>(p, q, k);
+            break;
+        case 1:
+            project_blocks<1>(p, q, k);
+            break;
+        default:
+            break;
+    }
+}
+
+GEOMSRV_WIDE_CLONES void project_all_of_both(const PairedPolygon& a, const PairedPolygon& b) {
+    project_all(a, b);
+    project_all(b, a);
+}
+
+std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
     std::size_t best = 0;
-    double low = std::numeric_limits<double>::infinity();
+    double low = kInfinity;
     for (std::size_t j = 0; j < q.ring.size(); ++j) {
         const double height = dot(axis, q.local(j));
         // Without a branch: which vertex is lowest cannot be predicted.
@@ -240,7 +220,7 @@ GEOMSRV_INLINE std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
 /// Height gained along an axis by the edge that starts at a vertex of q.
 double gain(Vec2 axis, const PairedPolygon& q, std::size_t vertex) { return -cross(axis, q.axis(vertex)); }
 
-/// The same gaps for edges, by walking round q once while the axes go round p.
+/// The same gaps, by walking round q once while the edges go round p.
 void project_by_walking(const PairedPolygon& p, const PairedPolygon& q) {
     std::size_t j = lowest_vertex(q, p.axis(0));
     for (std::size_t k = 0; k < p.edges; ++k) {
@@ -248,68 +228,36 @@ void project_by_walking(const PairedPolygon& p, const PairedPolygon& q) {
         for (std::size_t steps = 0; steps < q.edges && gain(axis, q, j) < 0.0; ++steps) {
             j = q.next(j);
         }
-        p.gap[k] = dot(axis, q.local(j)) - p.own[k];
+        p.gap[k] = dot(axis, q.local(j)) - p.own(k);
     }
     for (std::size_t k = p.edges; k < p.axes; ++k) {
-        p.gap[k] = dot(p.axis(k), q.local(lowest_vertex(q, p.axis(k)))) - p.own[k];
+        p.gap[k] = dot(p.axis(k), q.local(lowest_vertex(q, p.axis(k)))) - p.own(k);
     }
-    std::fill(p.gap + p.axes, p.gap + padded(p.axes), -1.0);
 }
 
-GEOMSRV_WIDE_CLONES double place_both(const PairedPolygon& a, const PairedPolygon& b, Vec2 origin) {
-    const double reach_a = place_vertices(a, origin);
-    const double reach_b = place_vertices(b, origin);
-    place_edges(a);
-    place_edges(b);
-    return greater(reach_a, reach_b);
-}
-
-GEOMSRV_WIDE_CLONES EdgeCheck check_and_place_own(const PairedPolygon& p) {
-    const EdgeCheck check = check_edges(p);
-    place_own(p);
-    return check;
-}
-
-GEOMSRV_WIDE_CLONES void project_all_of_both(const PairedPolygon& a, const PairedPolygon& b) {
-    project_all(a, b);
-    project_all(b, a);
-}
-
-/// Counts vertices from `start` on, in one direction, that are level with it.
-std::size_t count_level(const PairedPolygon& q, Vec2 axis, std::size_t start, bool forward, Slack slack) {
+/// The chain extended at both ends by vertices that are level with it.
+Chain extend_level(const PairedPolygon& q, Vec2 axis, Chain chain, std::size_t length, Slack slack) {
     const double axis_length = std::fabs(axis.x) + std::fabs(axis.y);
-    double height = 0.0;
-    double length = 0.0;
-    double rounding = 0.0;
-    std::size_t vertex = start;
-    std::size_t count = 0;
-    while (count + 1 < q.ring.size()) {
-        const std::size_t edge = forward ? vertex : q.previous(vertex);
-        const Vec2 normal = q.axis(edge);
-        const double step = gain(axis, q, edge);
-        height += forward ? step : -step;
-        length += std::fabs(normal.x) + std::fabs(normal.y);
-        rounding +=
-            kHeightError * (std::fabs(axis.x * normal.y) + std::fabs(axis.y * normal.x)) + kPairUnderflow;
-        const double level =
-            rounding + std::min(slack.noise * (axis_length + length), slack.limit * axis_length);
-        if (!(std::fabs(height) <= level)) {
-            break;
+    for (const bool forward : {true, false}) {
+        double height = 0.0;
+        double way = 0.0;
+        double rounding = 0.0;
+        for (; length < q.ring.size(); ++length) {
+            const std::size_t edge = forward ? chain.last : q.previous(chain.first);
+            const Vec2 normal = q.axis(edge);
+            const double left = axis.x * normal.y;
+            const double right = axis.y * normal.x;
+            height += forward ? right - left : left - right;
+            way += std::fabs(normal.x) + std::fabs(normal.y);
+            rounding += kHeightError * (std::fabs(left) + std::fabs(right)) + kPairUnderflow;
+            const double noise = std::min(slack.noise * (axis_length + way), slack.limit * axis_length);
+            if (!(std::fabs(height) <= rounding + noise)) {
+                break;
+            }
+            (forward ? chain.last : chain.first) = forward ? q.next(edge) : edge;
         }
-        vertex = forward ? q.next(vertex) : edge;
-        ++count;
     }
-    return count;
-}
-
-/// Vertices of q level with an extreme one.
-Chain level_chain(const PairedPolygon& q, Vec2 axis, std::size_t start, Slack slack) {
-    const std::size_t n = q.ring.size();
-    const std::size_t ahead = count_level(q, axis, start, true, slack);
-    const std::size_t behind = std::min(count_level(q, axis, start, false, slack), n - 1 - ahead);
-    const std::size_t first = start >= behind ? start - behind : start + n - behind;
-    const std::size_t last = start + ahead;
-    return {first, last < n ? last : last - n};
+    return chain;
 }
 
 DoubleDouble difference_of(double to, double from, double before, double scale) {
@@ -320,18 +268,21 @@ DoubleDouble difference_of(double to, double from, double before, double scale) 
 }  // namespace
 
 PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
-    // Room for the ring of edges to go on past its end, for tips, and for whole blocks of lanes.
+    // Room for the ring to go on past its end, for tips, and for whole blocks of lanes.
     const std::array<std::size_t, 2> lengths = {padded(largest_a + 2 * kLanes),
                                                 padded(largest_b + 2 * kLanes)};
-    constexpr std::size_t kArrays = 9;
+    constexpr std::size_t kArrays = 8;
+    around_.resize(lengths[0] + lengths[1]);
     storage_.resize(kArrays * (lengths[0] + lengths[1]));
+    Vec2* around = around_.data();
     double* at = storage_.data();
-    for (std::size_t side = 0; side < 2; ++side) {
-        PairedPolygon& p = sides_[side];
-        for (double** array :
-             {&p.x, &p.y, &p.dx, &p.dy, &p.own, &p.gap, &p.work[0], &p.work[1], &p.work[2]}) {
+    for (std::size_t i = 0; i < 2; ++i) {
+        PairedPolygon& p = sides_[i];
+        p.around = around;
+        around += lengths[i];
+        for (double** array : {&p.x, &p.y, &p.dx, &p.dy, &p.gap, &p.work[0], &p.work[1], &p.work[2]}) {
             *array = at;
-            at += lengths[side];
+            at += lengths[i];
         }
     }
 }
@@ -344,18 +295,22 @@ void PolygonPair::load(Ring a, Ring b) {
 }
 
 bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
-    const Vec2 origin = a[0];
     auto& [first, second] = sides_;
     first.ring = a;
     second.ring = b;
+    const Vec2 origin = a[0];
+    copy_around(first);
+    copy_around(second);
     before_ = 1.0;
     scale_ = 1.0;
     scale_exponent_ = 0;
-    reach_ = place_both(first, second, origin);
+    std::array<Placed, 2> placed = {place_plain(first, origin), place_plain(second, origin)};
+    reach_ = std::max(placed[0].reach, placed[1].reach);
     if (!(reach_ <= kLargestReach) || (reach_ < kSmallestReach && reach_ > 0.0)) {
         const auto place_again = [&] {
-            reach_ = std::max(place_scaled(first, origin, before_, scale_),
-                              place_scaled(second, origin, before_, scale_));
+            const Units<true> units{before_, scale_};
+            placed = {place_scaled(first, origin, units), place_scaled(second, origin, units)};
+            reach_ = std::max(placed[0].reach, placed[1].reach);
         };
         // Coordinates of opposite signs may differ by more than the largest double.
         if (std::isinf(reach_)) {
@@ -369,43 +324,31 @@ bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
         place_again();
     }
     magnitude_ = scale_ * (before_ * largest_coordinate(origin)) + reach_;
-    if (!place_axes(first, known_strict) || !place_axes(second, known_strict)) {
-        return false;
+    for (const std::size_t i : {0U, 1U}) {
+        PairedPolygon& p = sides_[i];
+        const std::size_t n = p.ring.size();
+        p.edges = n > 1 ? n : 0;
+        p.axes = p.edges;
+        if (n > 2 && !placed[i].strict && !known_strict) {
+            return false;
+        }
+        if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0) {
+            return false;
+        }
+        if ((placed[i].has_tips || n == 2) && !append_tips(p)) {
+            return false;
+        }
     }
     if (first.edges == 0 && second.edges == 0) {
         // Two points: any two axes and their opposites.
-        constexpr std::array<Vec2, 4> kAxes = {{{1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}, {0.0, -1.0}}};
-        for (std::size_t k = 0; k < kAxes.size(); ++k) {
-            first.dx[k] = kAxes[k].x;
-            first.dy[k] = kAxes[k].y;
-            first.own[k] = 0.0;  // the point is the origin
-            first.tip[k] = 0;
+        for (const Vec2 axis : {Vec2{1.0, 0.0}, Vec2{0.0, 1.0}, Vec2{-1.0, 0.0}, Vec2{0.0, -1.0}}) {
+            append_axis(first, axis, 0);
         }
-        first.axes = kAxes.size();
     }
-    return true;
-}
-
-bool PolygonPair::place_axes(PairedPolygon& p, bool known_strict) {
-    const std::size_t n = p.ring.size();
-    p.edges = n > 1 ? n : 0;
-    p.axes = p.edges;
-    if (n == 1) {
-        return true;
-    }
-    const EdgeCheck check = check_and_place_own(p);
-    if (n > 2 && !check.strict && !known_strict) {
-        return false;
-    }
-    if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0) {
-        return false;
-    }
-    if ((check.has_tips || n == 2) && !place_tips(p)) {
-        return false;
-    }
-    for (std::size_t k = p.axes; k < padded(p.axes); ++k) {
-        p.dx[k] = p.dy[k] = 0.0;
-        p.own[k] = 1.0;  // a gap of -1: overlapping whatever the motion, so padding never matters
+    // Axes up to the next whole block have no length and, see project(), a gap of -1.
+    for (const PairedPolygon& p : sides_) {
+        std::fill_n(p.dx + p.axes, kLanes - 1, 0.0);
+        std::fill_n(p.dy + p.axes, kLanes - 1, 0.0);
     }
     return true;
 }
@@ -418,6 +361,9 @@ void PolygonPair::project() {
         project_by_walking(b, a);
     } else {
         project_all_of_both(a, b);
+    }
+    for (const PairedPolygon& p : sides_) {
+        std::fill_n(p.gap + p.axes, kLanes - 1, -1.0);
     }
     gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kRoundoff * reach_;
 }
@@ -441,17 +387,19 @@ std::size_t PolygonPair::lowest(AxisOf axis) const {
 }
 
 Chain PolygonPair::lowest(AxisOf axis, std::size_t vertex, Slack slack) const {
-    return level_chain(other(axis.side), side(axis.side).axis(axis.index), vertex, slack);
+    return extend_level(other(axis.side), side(axis.side).axis(axis.index), {vertex, vertex}, 1, slack);
 }
 
 Chain PolygonPair::highest(AxisOf axis, Slack slack) const {
     const PairedPolygon& p = side(axis.side);
-    return level_chain(p, p.axis(axis.index), p.base(axis.index), slack);
+    const std::size_t base = p.base(axis.index);
+    const bool edge = axis.index < p.edges;
+    return extend_level(p, p.axis(axis.index), {base, edge ? p.next(base) : base}, edge ? 2 : 1, slack);
 }
 
 AxisOf PolygonPair::widest_gap() const {
     AxisOf best;
-    double widest = -std::numeric_limits<double>::infinity();
+    double widest = -kInfinity;
     const auto consider = [&](int i, std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const double width = side(i).gap[k] / std::hypot(side(i).dx[k], side(i).dy[k]);

@@ -53,12 +53,12 @@ struct PairedPolygon {
     std::size_t edges = 0;  ///< 0 for a point, 2 for a segment
     std::size_t axes = 0;   ///< edges, then tips
     std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis
-    double* x = nullptr;               ///< vertices relative to the origin of the pair, times its scale
+    Vec2* around = nullptr;            ///< the ring, going on past its end
+    double* x = nullptr;  ///< vertices relative to the origin of the pair, times its scale; then the tips'
     double* y = nullptr;
-    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`, where the gap is -1
+    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`
     double* dy = nullptr;
-    double* own = nullptr;          ///< own support along the axis
-    double* gap = nullptr;          ///< support of the other polygon minus own
+    double* gap = nullptr;          ///< support of the other polygon minus own; -1 beyond `axes`
     std::array<double*, 3> work{};  ///< for the query
 
     /// First of the vertices on which the axis rests: its edge's, or the tip.
@@ -71,6 +71,8 @@ struct PairedPolygon {
     }
     [[nodiscard]] Vec2 axis(std::size_t k) const { return {dx[k], dy[k]}; }
     [[nodiscard]] Vec2 local(std::size_t vertex) const { return {x[vertex], y[vertex]}; }
+    /// Own support along an axis.
+    [[nodiscard]] double own(std::size_t k) const { return dot(axis(k), local(k)); }
 };
 
 /// A vector of the given numbers, unrounded: the difference of two points, or an edge's normal.
@@ -173,10 +175,10 @@ public:
 
 private:
     bool place(Ring a, Ring b, bool known_strict);
-    bool place_axes(PairedPolygon& p, bool known_strict);
     void project();
 
     std::array<PairedPolygon, 2> sides_;
+    std::vector<Vec2> around_;
     std::vector<double> storage_;
     std::array<StrictHull, 2> hulls_;
     double reach_ = 0.0;
