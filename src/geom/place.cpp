@@ -44,8 +44,8 @@ Rounded rounded(WideVec3 v, double size) {
 bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
 /// scale * (R m + t - origin): far from the origin these cancel, so the sum is formed in double-double.
-Rounded relative_wide(Vec3 m, const Transform& X, const LocalFrame& frame, bool turned) {
-    const Vec3 t = frame.scale * X.translation;
+Rounded relative_wide(Vec3 m, const Transform& X_ls, const LocalFrame& frame, bool turned) {
+    const Vec3 t = frame.scale * X_ls.translation;
     const Vec3 o = frame.scale * frame.origin;
     const Vec3 p = frame.scale * m;
     if (!turned) {
@@ -54,26 +54,26 @@ Rounded relative_wide(Vec3 m, const Transform& X, const LocalFrame& frame, bool 
         return rounded(sum, safe_norm(narrow(sum)));
     }
     // The products of a rotation are off relative to themselves.
-    const auto row = [&](int i) { return dot(widen(p), X.rotation.row[i]); };
+    const auto row = [&](int i) { return dot(widen(p), X_ls.rotation.row[i]); };
     const WideVec3 rotated = {row(0), row(1), row(2)};
     return rounded(rotated + exact_difference(t, o), safe_norm(p) + safe_norm(t) + safe_norm(o));
 }
 
 /// The same, at no cost where nothing can round.
-Rounded relative(Vec3 m, const Transform& X, const LocalFrame& frame, bool turned) {
+Rounded relative(Vec3 m, const Transform& X_ls, const LocalFrame& frame, bool turned) {
     if (is_zero(m) && is_zero(frame.origin)) {
-        return {frame.scale * X.translation, 0.0};
+        return {frame.scale * X_ls.translation, 0.0};
     }
-    return relative_wide(m, X, frame, turned);
+    return relative_wide(m, X_ls, frame, turned);
 }
 
-PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, const LocalFrame& frame) {
+PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame) {
     const WideVec3 own = widen({shape.params[0], shape.params[1], shape.params[2]});
-    const auto row = [&](int i) { return dot(own, X.rotation.row[i]); };
+    const auto row = [&](int i) { return dot(own, X_ls.rotation.row[i]); };
     const WideVec3 turned = {row(0), row(1), row(2)};
     const Rounded normal = rounded(turned, 0.0);
     // normal . (x - t) <= offset becomes normal . local <= offset + normal . (t - origin).
-    const WideVec3 shift = exact_difference(frame.scale * X.translation, frame.scale * frame.origin);
+    const WideVec3 shift = exact_difference(frame.scale * X_ls.translation, frame.scale * frame.origin);
     const double own_offset = frame.scale * shape.params[3];
     const DoubleDouble offset = DoubleDouble{own_offset, 0.0} + dot(turned, shift);
     const double size = std::abs(own_offset) + safe_norm(narrow(shift));
@@ -84,7 +84,7 @@ PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X, con
     return {normal.value, offset.hi, normal.error + normal_lost, std::abs(offset.lo) + lost};
 }
 
-void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch,
+void place_hull(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch,
                 Core& core) {
     const HullExtent extent = shape.extent != nullptr ? *shape.extent : extent_of(shape);
     const double scale = frame.scale;
@@ -94,8 +94,8 @@ void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& fr
     double* x = scratch;
     double* y = x + n;
     double* z = y + n;
-    const bool turned = !is_identity(X.rotation);
-    const Mat3& r = X.rotation;
+    const bool turned = !is_identity(X_ls.rotation);
+    const Mat3& r = X_ls.rotation;
     for (std::size_t i = 0; i < n; ++i) {
         const double* v = shape.vertices + 3 * i;
         const Vec3 local = {scale * v[0] - m.x, scale * v[1] - m.y, scale * v[2] - m.z};
@@ -104,7 +104,7 @@ void place_hull(const ShapeView& shape, const Transform& X, const LocalFrame& fr
         y[i] = p.y;
         z[i] = p.z;
     }
-    const Rounded center = relative(extent.middle, X, frame, turned);
+    const Rounded center = relative(extent.middle, X_ls, frame, turned);
     core.center = center.value;
     core.points = scratch;
     core.count = static_cast<int>(shape.count);
@@ -160,8 +160,8 @@ Vec3 middle_of(const ShapeView& shape) {
     return shape.extent != nullptr ? shape.extent->middle : extent_of(shape).middle;
 }
 
-double magnitude_of(const ShapeView& shape, const Transform& X) {
-    double largest = largest_of(X.translation);
+double magnitude_of(const ShapeView& shape, const Transform& X_ls) {
+    double largest = largest_of(X_ls.translation);
     const int first = shape.kind == ShapeKind::half_space ? 3 : shape.kind == ShapeKind::capsule ? 1 : 0;
     const int last = shape.kind == ShapeKind::box ? 3 : first + 1;
     for (int i = first; i < last && shape.kind != ShapeKind::sphere; ++i) {
@@ -173,32 +173,32 @@ double magnitude_of(const ShapeView& shape, const Transform& X) {
     return largest;
 }
 
-Placed place(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch) {
+Placed place(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch) {
     Placed out;
     if (shape.kind == ShapeKind::half_space) {
-        out.half_space = place_half_space(shape, X, frame);
+        out.half_space = place_half_space(shape, X_ls, frame);
         return out;
     }
     Core& core = out.core;
     if (shape.kind == ShapeKind::convex) {
-        place_hull(shape, X, frame, scratch, core);
+        place_hull(shape, X_ls, frame, scratch, core);
         return out;
     }
-    const bool turned = !is_identity(X.rotation);
-    const Rounded center = relative({}, X, frame, turned);
+    const bool turned = !is_identity(X_ls.rotation);
+    const Rounded center = relative({}, X_ls, frame, turned);
     core.center = center.value;
     double spread = 0.0;
     if (shape.kind == ShapeKind::box) {
         core.generators = 3;
         for (int i = 0; i < 3; ++i) {
             const double half = frame.scale * shape.params[i];
-            core.generator[i] = half * column(X.rotation, i);
+            core.generator[i] = half * column(X_ls.rotation, i);
             spread += half;
         }
     } else if (shape.kind == ShapeKind::capsule) {
         core.generators = 1;
         const double half = frame.scale * shape.params[1];
-        core.generator[0] = half * column(X.rotation, 2);
+        core.generator[0] = half * column(X_ls.rotation, 2);
         spread = half;
     }
     spread *= 1.0 + kRotationStretch;

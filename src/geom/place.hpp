@@ -30,10 +30,10 @@ HullExtent extent_of(const ShapeView& shape);
 Vec3 middle_of(const ShapeView& shape);
 
 /// The largest coordinate of anything the shape and its pose consist of.
-double magnitude_of(const ShapeView& shape, const Transform& X);
+double magnitude_of(const ShapeView& shape, const Transform& X_ls);
 
-/// X: pose of the shape in the frame's axes.  `scratch` takes the 3 * count coordinates of a hull.
-Placed place(const ShapeView& shape, const Transform& X, const LocalFrame& frame, double* scratch);
+/// X_ls: pose of the shape in the frame's axes.  `scratch` takes the 3 * count coordinates of a hull.
+Placed place(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch);
 
 /// Box center +- half_extents[i] * axes[i]; the rows of `axes` are taken literally.
 Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFrame& frame);
