@@ -951,6 +951,34 @@ def test_boxes_are_culled_as_by_the_query():
     assert answer.visible == [o.id for o, state in zip(boxes, answer.state, strict=True) if state != gs.OUTSIDE]
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_hulls_of_box_corners_are_culled_as_boxes(seed):
+    """Two ways to the same states: the kernel for boxes, and supports and distance for anything else."""
+    rng = np.random.default_rng(seed)
+    turn = gs._validate.rotation_matrices(random_pose(rng)[None, 3:])[0]
+    low, high = -rng.uniform(0.2, 1.5, 2), rng.uniform(0.2, 1.5, 2)
+    bounds = (low[0], high[0], low[1], high[1])
+    camera = gs.Frustum(rng.uniform(-9.0, 9.0, 3), turn, near=1.0, far=9.0, bounds=bounds)
+    boxes, hulls, balls = [], [], []
+    for k in range(200):
+        half, pose = rng.uniform(0.0, 1.2, 3), random_pose(rng, 5.0)
+        pose[:3] += camera.origin + 4.0 * turn[2]
+        boxes.append(gs.SceneObject(f"{k:03}", gs.Box(half), pose))
+        hulls.append(gs.SceneObject(f"{k:03}", gs.Convex(gs.shapes.CORNER_SIGNS * half), pose))
+        balls += [gs.SceneObject(f"{k:03} s", gs.Sphere(half[0]), pose)]
+        balls += [gs.SceneObject(f"{k:03} z", gs.Capsule(half[0], 0.0), pose)]
+    wanted, got = scene_of(boxes).cull(camera), scene_of(hulls).cull(camera)
+    assert wanted.certain.all() and got.certain.all()
+    np.testing.assert_array_equal(got.state, wanted.state)
+    assert (np.bincount(got.state, minlength=3) >= [50, 20, 5]).all()
+    state = scene_of(balls).cull(camera).state
+    np.testing.assert_array_equal(state[::2], state[1::2])
+    # A ball is inside if no face is nearer to its centre than its radius; the distance to the faces is another way.
+    for item, seen in zip(balls[::2], state[::2].tolist(), strict=True):
+        gap = gs.distance_to_frustum(camera, [item.pose[:3]]).distance[0]
+        assert (seen == gs.OUTSIDE) == (gap > item.shape.radius)
+
+
 def test_other_shapes_are_culled_by_what_they_are():
     ring = gs.Polygon([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
     side = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)  # outward normal of the plane x = z
