@@ -29,7 +29,9 @@ def first_contact_polygons(
     t_max: float,
     contact_set: bool,
 ) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I]: ...
-def distance_polygons(vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool) -> _Distances: ...
+def distance_polygons(
+    vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool
+) -> _Distances: ...
 def distance_boxes(
     center_a: _F,
     axes_a: _F,
@@ -48,21 +50,45 @@ def distance_boxes_stages(
     half_extents_b: _F,
     penetration: bool,
 ) -> _Stages: ...
-def distance_polytopes(
-    vertices_a: _F,
-    offsets_a: _I,
-    error_a: _F,
+def distance_boxes_polytopes(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
     vertices_b: _F,
     offsets_b: _I,
+    origin_b: _F,
     error_b: _F,
     penetration: bool,
 ) -> _Distances: ...
-def distance_polytopes_stages(
+def distance_polytopes(
     vertices_a: _F,
     offsets_a: _I,
+    origin_a: _F,
     error_a: _F,
     vertices_b: _F,
     offsets_b: _I,
+    origin_b: _F,
+    error_b: _F,
+    penetration: bool,
+) -> _Distances: ...
+def distance_boxes_polytopes_stages(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
+    vertices_b: _F,
+    offsets_b: _I,
+    origin_b: _F,
+    error_b: _F,
+    penetration: bool,
+) -> _Stages: ...
+def distance_polytopes_stages(
+    vertices_a: _F,
+    offsets_a: _I,
+    origin_a: _F,
+    error_a: _F,
+    vertices_b: _F,
+    offsets_b: _I,
+    origin_b: _F,
     error_b: _F,
     penetration: bool,
 ) -> _Stages: ...

@@ -21,7 +21,7 @@ from geomsrv.answers import (
     FirstContacts,
 )
 from geomsrv.errors import GeometryError
-from geomsrv.shapes import CORNER_ERROR, Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
+from geomsrv.shapes import Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -274,13 +274,15 @@ def distance(
     if poses_ab is None:
         answer, message = _batch_distance(a, b, "penetration" in effects), ""
     else:
-        _expect(a, (Shape, Frustum), "a")
-        _expect(b, (Shape, Frustum), "b")
+        shapes: list[Any] = [a, b]
+        for shape, name in zip(shapes, "ab", strict=True):
+            _expect(shape, (Shape, Frustum), name)
         poses = _validate.poses(poses_ab, "poses_ab")
         pairs = np.broadcast_to(np.array([0, 1]), (len(poses), 2))
-        answer = _core.distance_pairs(*pack([a, b]), np.ascontiguousarray(pairs), poses, "penetration" in effects)
+        answer = _core.distance_pairs(*pack(shapes), np.ascontiguousarray(pairs), poses, "penetration" in effects)
         unsupported = (answer[6] == DistanceStatus.UNSUPPORTED).any()
-        message = f"distance {a.kind}-{b.kind} is unsupported in this version" if unsupported else ""
+        kinds = "-".join(shape.kind for shape in shapes)
+        message = f"distance {kinds} is unsupported in this version" if unsupported else ""
     gap, lower, upper, point_a, point_b, normal, status = answer
     totals = np.bincount(status, minlength=len(DistanceStatus))
     counts = {outcome.name.lower(): int(totals[outcome]) for outcome in DistanceStatus if totals[outcome]}
@@ -347,51 +349,21 @@ def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:
         return _core.distance_boxes(
             a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration
         )
-    if isinstance(a, Polytopes) and isinstance(b, Polytopes):
-        literal = [np.zeros(len(side)) for side in (a, b)]
-        return _core.distance_polytopes(
-            a.vertices, a.offsets, literal[0], b.vertices, b.offsets, literal[1], penetration
-        )
-    # Corners are rounded relative to a point of the pair, so that a far-away pair loses nothing.
-    anchor = _anchors(b if _length(b) == 1 else a)
-    sides = (*_relative_vertices(a, anchor), *_relative_vertices(b, anchor))
-    gap, lower, upper, point_a, point_b, normal, status = _core.distance_polytopes(*sides, penetration)
-    return gap, lower, upper, point_a + anchor, point_b + anchor, normal, status
+    if isinstance(a, Boxes):
+        return _core.distance_boxes_polytopes(a.center, a.axes, a.half_extents, *_hulls(b), penetration)
+    if isinstance(b, Boxes):
+        answer = _core.distance_boxes_polytopes(b.center, b.axes, b.half_extents, *_hulls(a), penetration)
+        gap, lower, upper, point_b, point_a, normal, status = answer
+        return gap, lower, upper, point_a, point_b, -normal, status
+    return _core.distance_polytopes(*_hulls(a), *_hulls(b), penetration)
 
 
-def _anchors(side: Boxes | Polytopes | Frustum) -> FloatArray:
-    """(n, 3): a point of every item."""
-    if isinstance(side, Boxes):
-        return side.center
-    if isinstance(side, Polytopes):
-        return side.vertices[side.offsets[:-1]]
-    return side.origin[None]
-
-
-def _relative_vertices(
-    side: Boxes | Polytopes | Frustum, anchor: FloatArray
-) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
-    """Vertices relative to the anchors (n, 3), offsets, and how far rounding may have moved each item's vertices.
-
-    One item against n anchors becomes n items; one anchor serves all items.
-    """
-    if isinstance(side, Polytopes):
-        sizes = np.diff(side.offsets)
-        if len(side) == 1:
-            local = (side.vertices[None] - anchor[:, None]).reshape(-1, 3)
-            offsets = np.arange(len(anchor) + 1) * sizes[0]
-        else:
-            local = side.vertices - np.repeat(np.broadcast_to(anchor, (len(side), 3)), sizes, axis=0)
-            offsets = side.offsets
-        return local, offsets, CORNER_ERROR * np.maximum.reduceat(np.abs(local).max(axis=1), offsets[:-1])
-    corners = side.corners(np.broadcast_to(anchor, (max(_length(side), len(anchor)), 3)))
-    offsets = np.arange(len(corners) + 1) * 8
-    error = (
-        side.corner_error(anchor)
-        if isinstance(side, Frustum)
-        else CORNER_ERROR * np.abs(corners).max(axis=(1, 2), initial=0.0)
-    )
-    return np.ascontiguousarray(corners.reshape(-1, 3)), offsets, error
+def _hulls(side: Polytopes | Frustum) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
+    """Vertices, offsets, what the vertices are relative to, and how far each may be from the one meant."""
+    if isinstance(side, Frustum):
+        corners = side.corners(side.origin)
+        return corners, np.array([0, len(corners)]), side.origin[None], np.array([side.corner_error(side.origin)])
+    return side.vertices, side.offsets, np.zeros((len(side), 3)), np.zeros(len(side))
 
 
 def _length(side: Batch) -> int:

@@ -168,63 +168,111 @@ nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& 
 
 Vec3 vec3_at(const double* row) { return {row[0], row[1], row[2]}; }
 
+/// Boxes of a batch; one serves every pair.
+struct BoxRows {
+    const Rows3& center;
+    const Matrices3& axes;
+    const Rows3& half_extents;
+
+    std::size_t count() const { return center.shape(0); }
+    bool consistent() const { return axes.shape(0) == count() && half_extents.shape(0) == count(); }
+    WorldBody body(std::size_t i) const {
+        const std::size_t row = count() == 1 ? 0 : i;
+        const double* m = axes.data() + 9 * row;
+        WorldBody out;
+        out.is_box = true;
+        out.box = {vec3_at(center.data() + 3 * row),
+                   {{vec3_at(m), vec3_at(m + 3), vec3_at(m + 6)}},
+                   vec3_at(half_extents.data() + 3 * row)};
+        return out;
+    }
+};
+
+/// Hulls of a batch; one serves every pair.
+struct HullRows {
+    const Rows3& vertices;
+    const Offsets& offsets;
+    const Rows3& origin;
+    const Values& error;
+
+    std::size_t count() const { return offsets.size() - 1; }
+    bool consistent() const { return origin.shape(0) == count() && error.size() == count(); }
+    std::size_t scratch_size() const { return 3 * longest(offsets.data(), count()); }
+    /// `extent` must outlive the body.
+    WorldBody body(std::size_t i, HullExtent& extent) const {
+        const std::size_t row = count() == 1 ? 0 : i;
+        WorldBody out;
+        out.hull = {ShapeKind::convex, error.data() + row, vertices.data() + 3 * offsets.data()[row],
+                    static_cast<std::ptrdiff_t>(offsets.data()[row + 1] - offsets.data()[row])};
+        extent = extent_of(out.hull);
+        out.hull.extent = &extent;
+        out.origin = vec3_at(origin.data() + 3 * row);
+        return out;
+    }
+};
+
+/// Pairs of two batches of which one may have a single item.
+template <class A, class B>
+std::size_t common_count(const A& a, const B& b) {
+    const std::size_t n = a.count() == 1 ? b.count() : a.count();
+    if ((b.count() != n && b.count() != 1) || !a.consistent() || !b.consistent()) {
+        throw nb::value_error("distance: arrays of different length");
+    }
+    return n;
+}
+
 template <class Sink>
 nb::tuple distance_boxes(const Rows3& center_a, const Matrices3& axes_a, const Rows3& half_extents_a,
                          const Rows3& center_b, const Matrices3& axes_b, const Rows3& half_extents_b,
                          bool penetration) {
-    const std::size_t count_a = center_a.shape(0);
-    const std::size_t count_b = center_b.shape(0);
-    const std::size_t n = count_a == 1 ? count_b : count_a;
-    if ((count_b != n && count_b != 1) || axes_a.shape(0) != count_a || half_extents_a.shape(0) != count_a ||
-        axes_b.shape(0) != count_b || half_extents_b.shape(0) != count_b) {
-        throw nb::value_error("distance_boxes: arrays of different length");
-    }
+    const BoxRows a{center_a, axes_a, half_extents_a};
+    const BoxRows b{center_b, axes_b, half_extents_b};
+    const std::size_t n = common_count(a, b);
     const Sink out(n);
     {
         const nb::gil_scoped_release unlocked;
-        const auto box = [](const Rows3& center, const Matrices3& axes, const Rows3& half, std::size_t i) {
-            const double* m = axes.data() + 9 * i;
-            return BoxView{vec3_at(center.data() + 3 * i),
-                           {{vec3_at(m), vec3_at(m + 3), vec3_at(m + 6)}},
-                           vec3_at(half.data() + 3 * i)};
-        };
         for (std::size_t i = 0; i < n; ++i) {
-            out.set(i,
-                    box_distance(box(center_a, axes_a, half_extents_a, count_a == 1 ? 0 : i),
-                                 box(center_b, axes_b, half_extents_b, count_b == 1 ? 0 : i), penetration));
+            out.set(i, world_distance(a.body(i), b.body(i), penetration, nullptr));
         }
     }
     return out.tuple();
 }
 
 template <class Sink>
-nb::tuple distance_polytopes(const Rows3& vertices_a, const Offsets& offsets_a, const Values& error_a,
-                             const Rows3& vertices_b, const Offsets& offsets_b, const Values& error_b,
-                             bool penetration) {
-    const std::size_t count_a = offsets_a.size() - 1;
-    const std::size_t count_b = offsets_b.size() - 1;
-    const std::size_t n = count_a == 1 ? count_b : count_a;
-    if ((count_b != n && count_b != 1) || error_a.size() != count_a || error_b.size() != count_b) {
-        throw nb::value_error("distance_polytopes: arrays of different length");
-    }
+nb::tuple distance_boxes_polytopes(const Rows3& center_a, const Matrices3& axes_a,
+                                   const Rows3& half_extents_a, const Rows3& vertices_b,
+                                   const Offsets& offsets_b, const Rows3& origin_b, const Values& error_b,
+                                   bool penetration) {
+    const BoxRows a{center_a, axes_a, half_extents_a};
+    const HullRows b{vertices_b, offsets_b, origin_b, error_b};
+    const std::size_t n = common_count(a, b);
     const Sink out(n);
     {
         const nb::gil_scoped_release unlocked;
-        std::vector<double> scratch(
-            3 * (longest(offsets_a.data(), count_a) + longest(offsets_b.data(), count_b)));
-        const auto hull = [](const Rows3& vertices, const Offsets& offsets, const Values& error,
-                             std::size_t i) {
-            return ShapeView{ShapeKind::convex, error.data() + i, vertices.data() + 3 * offsets.data()[i],
-                             static_cast<std::ptrdiff_t>(offsets.data()[i + 1] - offsets.data()[i])};
-        };
+        std::vector<double> scratch(b.scratch_size());
+        HullExtent extent;
         for (std::size_t i = 0; i < n; ++i) {
-            ShapeView a = hull(vertices_a, offsets_a, error_a, count_a == 1 ? 0 : i);
-            ShapeView b = hull(vertices_b, offsets_b, error_b, count_b == 1 ? 0 : i);
-            const HullExtent extent_a = extent_of(a);
-            const HullExtent extent_b = extent_of(b);
-            a.extent = &extent_a;
-            b.extent = &extent_b;
-            out.set(i, shape_distance(a, b, {}, penetration, scratch.data()));
+            out.set(i, world_distance(a.body(i), b.body(i, extent), penetration, scratch.data()));
+        }
+    }
+    return out.tuple();
+}
+
+template <class Sink>
+nb::tuple distance_polytopes(const Rows3& vertices_a, const Offsets& offsets_a, const Rows3& origin_a,
+                             const Values& error_a, const Rows3& vertices_b, const Offsets& offsets_b,
+                             const Rows3& origin_b, const Values& error_b, bool penetration) {
+    const HullRows a{vertices_a, offsets_a, origin_a, error_a};
+    const HullRows b{vertices_b, offsets_b, origin_b, error_b};
+    const std::size_t n = common_count(a, b);
+    const Sink out(n);
+    {
+        const nb::gil_scoped_release unlocked;
+        std::vector<double> scratch(a.scratch_size() + b.scratch_size());
+        HullExtent extent_a;
+        HullExtent extent_b;
+        for (std::size_t i = 0; i < n; ++i) {
+            out.set(i, world_distance(a.body(i, extent_a), b.body(i, extent_b), penetration, scratch.data()));
         }
     }
     return out.tuple();
@@ -271,10 +319,17 @@ void define_distance(nb::module_& m) {
            nb::arg("center_a").noconvert(), nb::arg("axes_a").noconvert(),
            nb::arg("half_extents_a").noconvert(), nb::arg("center_b").noconvert(),
            nb::arg("axes_b").noconvert(), nb::arg("half_extents_b").noconvert(), nb::arg("penetration"));
+    define(m, "distance_boxes_polytopes", "distance_boxes_polytopes_stages",
+           distance_boxes_polytopes<Answers>, distance_boxes_polytopes<Stages>,
+           nb::arg("center_a").noconvert(), nb::arg("axes_a").noconvert(),
+           nb::arg("half_extents_a").noconvert(), nb::arg("vertices_b").noconvert(),
+           nb::arg("offsets_b").noconvert(), nb::arg("origin_b").noconvert(), nb::arg("error_b").noconvert(),
+           nb::arg("penetration"));
     define(m, "distance_polytopes", "distance_polytopes_stages", distance_polytopes<Answers>,
            distance_polytopes<Stages>, nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
-           nb::arg("error_a").noconvert(), nb::arg("vertices_b").noconvert(),
-           nb::arg("offsets_b").noconvert(), nb::arg("error_b").noconvert(), nb::arg("penetration"));
+           nb::arg("origin_a").noconvert(), nb::arg("error_a").noconvert(), nb::arg("vertices_b").noconvert(),
+           nb::arg("offsets_b").noconvert(), nb::arg("origin_b").noconvert(), nb::arg("error_b").noconvert(),
+           nb::arg("penetration"));
 }
 
 }  // namespace geomsrv::bind

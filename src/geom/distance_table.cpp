@@ -227,19 +227,25 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
     return with_radii(core, radius_of(a), radius_of(b), frame.origin, penetration);
 }
 
-Separation box_distance(const BoxView& a, const BoxView& b, bool penetration) {
+Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetration, double* scratch) {
+    const auto pose = [](const WorldBody& body) { return Transform{{}, body.origin}; };
+    const auto placed = [&](const WorldBody& body, const LocalFrame& f, double* memory) {
+        return body.is_box ? Placed{place_box(body.box.center, body.box.axes, body.box.half_extents, f), {}}
+                           : place(body.hull, pose(body), f, memory);
+    };
+    const auto magnitude = [&](const WorldBody& body) {
+        return body.is_box ? std::max(largest_of(body.box.center), largest_of(body.box.half_extents))
+                           : magnitude_of(body.hull, pose(body));
+    };
     LocalFrame frame;
-    frame.origin = a.center;
+    frame.origin = a.is_box ? a.box.center : a.origin + middle_of(a.hull);
     const CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
-            return LocalPair{{place_box(a.center, a.axes, a.half_extents, f), {}},
-                             {place_box(b.center, b.axes, b.half_extents, f), {}}};
+            return LocalPair{placed(a, f, scratch),
+                             placed(b, f, scratch + (a.is_box ? 0 : 3 * a.hull.count))};
         },
-        [&] {
-            return std::max({largest_of(a.center), largest_of(a.half_extents), largest_of(b.center),
-                             largest_of(b.half_extents)});
-        },
+        [&] { return std::max(magnitude(a), magnitude(b)); },
         [&](const LocalPair& pair) { return convex_convex(pair.a.core, pair.b.core, penetration); });
     return with_radii(core, 0.0, 0.0, frame.origin, penetration);
 }

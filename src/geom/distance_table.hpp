@@ -28,7 +28,16 @@ struct BoxView {
     Vec3 half_extents;
 };
 
-/// Results in the common frame of both boxes.
-Separation box_distance(const BoxView& a, const BoxView& b, bool penetration);
+/// A convex body in world coordinates.
+struct WorldBody {
+    bool is_box = false;
+    BoxView box;
+    ShapeView hull;  ///< of kind convex, unless it is a box
+    Vec3 origin;     ///< what the hull's vertices are relative to
+};
+
+/// Results in world coordinates; everything is computed relative to a, so nothing is lost far from the
+/// origin.
+Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetration, double* scratch);
 
 }  // namespace geomsrv
