@@ -36,9 +36,8 @@ struct BoxRows {
     }
     OrientedBox operator[](std::size_t i) const {
         const double* const a = axes + 9 * i;
-        return {center_of(i),
-                {{{a[0], a[1], a[2]}, {a[3], a[4], a[5]}, {a[6], a[7], a[8]}}},
-                half_extents_of(i)};
+        return {
+            center_of(i), {{{a[0], a[1], a[2]}, {a[3], a[4], a[5]}, {a[6], a[7], a[8]}}}, half_extents_of(i)};
     }
 };
 
@@ -68,7 +67,8 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
         std::size_t left = 0;
         std::size_t first = begin;
         for (; first + Lanes::kCount <= end; first += Lanes::kCount) {
-            const Lanes found = classify_by_sphere(planes, FourRows<3>(boxes.center + 3 * first).at, FourRows<3>(boxes.half_extents + 3 * first).at);
+            const Lanes found = classify_by_sphere(planes, FourRows<3>(boxes.center + 3 * first).at,
+                                                   FourRows<3>(boxes.half_extents + 3 * first).at);
             store_bytes(found, state + first);
             for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
                 undecided[left] = first + lane;
@@ -96,7 +96,8 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
     return counts;
 }
 
-// ------------------------------------------------------------------------------------------------------- points
+// -------------------------------------------------------------------------------------------------------
+// points
 
 template <int Sides>
 View<Sides> unpack_view(const double* p) {
@@ -168,25 +169,28 @@ void measure_all(const View<Sides>& view, const double* points, std::size_t coun
     constexpr std::size_t kDimension = Sides + 1;
     if (!is_ordinary(view)) {
         const auto frame = distance_frame<long double>(view);
-        for (std::size_t i = 0; i < count; ++i) out.put(i, distance_in_long_double(frame, points + kDimension * i));
+        for (std::size_t i = 0; i < count; ++i)
+            out.put(i, distance_in_long_double(frame, points + kDimension * i));
         return;
     }
     const auto frame = distance_frame<Lanes>(view);
     const auto measure = [&](const double* rows, std::size_t size, PointAnswers answers) {
         with_windows(frame, [&](auto kinds) {
             using Kinds = decltype(kinds);
-            (frame.refinements > 0 ? measure_points<Kinds, true, Sides> : measure_points<Kinds, false, Sides>)(
-                frame, view, rows, size, answers);
+            (frame.refinements > 0 ? measure_points<Kinds, true, Sides>
+                                   : measure_points<Kinds, false, Sides>)(frame, view, rows, size, answers);
         });
     };
     const std::size_t whole = count - count % Lanes::kCount;
     measure(points, whole, out);
     if (whole < count) {
         // The last few points fill a group by repetition.
-        double padded[Lanes::kCount * kDimension], values[3][Lanes::kCount], nearest[Lanes::kCount * kDimension];
+        double padded[Lanes::kCount * kDimension], values[3][Lanes::kCount],
+            nearest[Lanes::kCount * kDimension];
         std::uint8_t region[Lanes::kCount];
         for (std::size_t k = 0; k < Lanes::kCount; ++k) {
-            std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension, padded + kDimension * k);
+            std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension,
+                        padded + kDimension * k);
         }
         measure(padded, Lanes::kCount, {values[0], values[1], values[2], region, nearest});
         for (std::size_t k = 0; whole + k < count; ++k) {
@@ -217,7 +221,8 @@ nb::object distance_to_frustum_batch(const Packed& packed, const Points& points,
 void define_frustum(nb::module_& m) {
     m.def(
         "cull",
-        [](const PackedFrustum& packed, const Rows3& center, const Matrices3& axes, const Rows3& half_extents) {
+        [](const PackedFrustum& packed, const Rows3& center, const Matrices3& axes,
+           const Rows3& half_extents) {
             const std::size_t count = center.shape(0);
             auto state = empty<std::uint8_t>({count});
             auto certain = empty<bool>({count});
@@ -226,15 +231,16 @@ void define_frustum(nb::module_& m) {
                 const nb::gil_scoped_release unlocked;
                 const Frustum frustum = unpack(packed.data());
                 counts = cull_all(cull_planes(frustum), cull_frame(frustum),
-                                  {center.data(), axes.data(), half_extents.data()}, count, state.data, certain.data);
+                                  {center.data(), axes.data(), half_extents.data()}, count, state.data,
+                                  certain.data);
             }
             return nb::make_tuple(state.array, certain.array,
                                   nb::make_tuple(counts.bound, counts.filter, counts.uncertain));
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
         nb::arg("half_extents").noconvert());
-    m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>, nb::arg("frustum").noconvert(),
-          nb::arg("points").noconvert(), nb::arg("witness"));
+    m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>,
+          nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
     m.def("distance_to_frustum_2d", distance_to_frustum_batch<1, PackedFrustum2D, Rows2>,
           nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
 }

@@ -20,11 +20,11 @@
 namespace geomsrv {
 
 struct Frustum {
-    Vec3 origin;                    ///< apex E [m], world frame
-    Mat3 axes;                      ///< rows L, U, D, world frame; literal, off orthonormal by at most 1e-2
-    double l0 = -1.0, l1 = 1.0;     ///< window along L on the near plane [m], l0 < l1
-    double u0 = -1.0, u1 = 1.0;     ///< window along U on the near plane [m], u0 < u1
-    double near = 1.0, far = 2.0;   ///< depths along D [m], 0 < near < far
+    Vec3 origin;                   ///< apex E [m], world frame
+    Mat3 axes;                     ///< rows L, U, D, world frame; literal, off orthonormal by at most 1e-2
+    double l0 = -1.0, l1 = 1.0;    ///< window along L on the near plane [m], l0 < l1
+    double u0 = -1.0, u1 = 1.0;    ///< window along U on the near plane [m], u0 < u1
+    double near = 1.0, far = 2.0;  ///< depths along D [m], 0 < near < far
 };
 
 /// step(0), ..., step(Count - 1) with constant arguments: a loop around this one can become vector code.
@@ -35,7 +35,8 @@ GEOMSRV_INLINE void unrolled(Step step) {
     }(std::make_index_sequence<Count>{});
 }
 
-/// a b - c d with at most 2 units of roundoff, whatever cancels (Kahan; Jeannerod, Louvet, Muller 2013, theorem 3.1).
+/// a b - c d with at most 2 units of roundoff, whatever cancels (Kahan; Jeannerod, Louvet, Muller 2013,
+/// theorem 3.1).
 template <class Real>
 GEOMSRV_INLINE Real difference_of_products(Real a, Real b, Real c, Real d) {
     const Real cd = c * d;
@@ -49,11 +50,13 @@ struct Rows {
     Real row[Size][Size];
 };
 
-/// Dual basis of the axes: row i has scalar product 1 with axis i and 0 with the others, so row i times X - E is the i-th
-/// frustum coordinate even where the axes are not quite orthonormal.  For orthonormal axes it is the axes themselves.
+/// Dual basis of the axes: row i has scalar product 1 with axis i and 0 with the others, so row i times X - E
+/// is the i-th frustum coordinate even where the axes are not quite orthonormal.  For orthonormal axes it is
+/// the axes themselves.
 ///
-/// Each entry has a relative error of at most kDualError: 2u from the minor, 5.4u from the determinant (products and
-/// sums of the three minors, which have Cauchy-Schwarz sum of magnitudes <= 1.05 det), u from the division.
+/// Each entry has a relative error of at most kDualError: 2u from the minor, 5.4u from the determinant
+/// (products and sums of the three minors, which have Cauchy-Schwarz sum of magnitudes <= 1.05 det), u from
+/// the division.
 inline constexpr double kDualError = 9.0 * kUnitRoundoff;
 
 template <class Real>
@@ -67,7 +70,8 @@ Rows<Real, 3> dual_basis(const Rows<double, 3>& axes) {
             dual.row[i][k] = difference_of_products<Real>(a[y], b[z], a[z], b[y]);
         }
     }
-    const Real det = axes.row[0][0] * dual.row[0][0] + axes.row[0][1] * dual.row[0][1] + axes.row[0][2] * dual.row[0][2];
+    const Real det =
+        axes.row[0][0] * dual.row[0][0] + axes.row[0][1] * dual.row[0][1] + axes.row[0][2] * dual.row[0][2];
     for (auto& row : dual.row) {
         for (Real& entry : row) entry /= det;
     }

@@ -8,16 +8,19 @@ namespace geomsrv {
 
 namespace {
 
-// ---------------------------------------------------------------------------------------------- powers of two
+// ---------------------------------------------------------------------------------------------- powers of
+// two
 
-/// 2^exponent as two factors that are both normal numbers; products by it are exact unless the result itself leaves the
-/// range of double.  Exponents beyond +-2044 are cut there, where every product is 0 or infinite anyway.
+/// 2^exponent as two factors that are both normal numbers; products by it are exact unless the result itself
+/// leaves the range of double.  Exponents beyond +-2044 are cut there, where every product is 0 or infinite
+/// anyway.
 struct PowerOfTwo {
     double first, second;
-    explicit PowerOfTwo(int exponent) : first(normal(exponent / 2)), second(normal(exponent - exponent / 2)) {}
+    explicit PowerOfTwo(int exponent)
+        : first(normal(exponent / 2)), second(normal(exponent - exponent / 2)) {}
     double operator*(double value) const { return value * first * second; }
 
-   private:
+private:
     static double normal(int exponent) {
         constexpr int kBias = 1023, kMantissaBits = 52;
         const int biased = std::clamp(exponent, -1022, 1022) + kBias;
@@ -27,22 +30,29 @@ struct PowerOfTwo {
 
 Vec3 operator*(const PowerOfTwo& scale, Vec3 v) { return {scale * v.x, scale * v.y, scale * v.z}; }
 
+/// Exponent of the leading bit; too large for subnormal numbers, which is as good here.
+int exponent_of(double x) { return static_cast<int>(std::bit_cast<std::uint64_t>(x) >> 52 & 0x7ff) - 1023; }
+
 double largest(Vec3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
 
 Vec3 magnitudes(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
 
-// ------------------------------------------------------------------------------------------------- plane bounds
+// ------------------------------------------------------------------------------------------------- plane
+// bounds
 
-// u = unit roundoff.  Rounding errors of the planes, as multiples of u times the sum of the magnitudes of the terms:
+// u = unit roundoff.  Rounding errors of the planes, as multiples of u times the sum of the magnitudes of the
+// terms:
 //   entries of a normal        9 (dual basis) + 2 (p * row + r * row)                                   11
 //   s = normal . (C - E)       11 + 1 (C - E) + 1 (product) + 2 (sums) + 1 (minus offset)               16
 //   r = sum e_i |normal . A_i| 11 + 1 (product) + 2 (sums) + 1 (times e) + 2 (sums)                     17
 //   s +- r                                                                                              +1
-// Entries of A_i sum to at most 1.75 in magnitude, so the magnitudes sum to at most N (|X|_1 + 1.75 sum e_i) with N the
-// largest entry of the normal, cancellation not counted; `reach` has 2 for 1.75.  18 <= 20; 18 * 1.75 <= 20 * 2.
+// Entries of A_i sum to at most 1.75 in magnitude, so the magnitudes sum to at most N (|X|_1 + 1.75 sum e_i)
+// with N the largest entry of the normal, cancellation not counted; `reach` has 2 for 1.75.  18 <= 20; 18
+// * 1.75 <= 20 * 2.
 constexpr double kPlaneError = 20.0 * kUnitRoundoff;
 
-// A unit axis of a box may be off by 1e-2 in each product of rows, so sum e_i |n . A_i| <= |n| |e| sqrt(1.03).
+// A unit axis of a box may be off by 1e-2 in each product of rows, so sum e_i |n . A_i| <= |n| |e|
+// sqrt(1.03).
 constexpr double kMaxStretch = 1.02;
 
 // The subtraction of the offset and the final s +- r round once each, relative to the offset too.
@@ -51,37 +61,49 @@ constexpr double kOffsetError = 2.0 * kUnitRoundoff;
 // About 30 products per plane may underflow, each losing at most 2^-1075; normals are about 1.
 constexpr double kUnderflow = 0x1p-1060;
 
-// ------------------------------------------------------------------------------------------------- axes bounds
+// ------------------------------------------------------------------------------------------------- axes
+// bounds
 
-// Coordinates (a, b, d) are scaled, each by its own power of two: culling is affine invariant, and a needle or a very
-// wide window becomes an ordinary one.  A window thinner than 2^-450 near stays thin: then each product of one a, one b
-// and one d coordinate, and nothing larger is ever formed, stays below 2^1000.
-constexpr int kMinSlopeExponent = -450;
+// Culling is affine invariant, so everything is brought to about 1 by powers of two, which round nothing:
+// coordinates (a, b, d) each by its own, which makes an ordinary frustum of a needle or of a very wide
+// window; then the edges B_i of the box, each by its own against its extent; then all lengths.  Products of
+// what is left cannot overflow.  Windows thinner than 2^-1000 near stay thin, so that the map itself does not
+// overflow.
+constexpr int kMinSlopeExponent = -1000;
 
-// Entries of edges below this are set to zero, and the tolerances below are at least kFloor in each coordinate, which
-// covers that change (4 entries of at most 2^-300) and all underflow: edges that are not zero are then >= 2^-300, entries
-// of a cross product that are not zero are >= 2^-600 2^-104 (both factors have 53 bits), times kFloor >= 2^-994, while an
-// underflow loses 2^-1075.
+// Entries of edges below this are set to zero, and the tolerances below are at least kFloor in each
+// coordinate, which covers that change (4 entries of at most 2^-300) and all underflow: edges that are not
+// zero are then >= 2^-300, entries of a cross product that are not zero are >= 2^-600 2^-104 (both factors
+// have 53 bits), times kFloor >= 2^-994, while an underflow loses 2^-1075.
 constexpr double kNegligible = 0x1p-300;
 constexpr double kFloor = 0x1p-290;
 
-// Tolerance per coordinate is kCullError times the magnitudes Z + W, where Z = |C - E| + sum e_k |A_k|, mapped with the
-// magnitudes of the dual basis, and W = extent of the (truncated) frustum.  Two parts, u = unit roundoff:
+// On the way to those units, where lengths are about 1 but the map is not, about 20 products and entries may
+// underflow, each losing at most 2^-1075.  What they lose is mapped, scaled and added to kFloor.
+constexpr double kLost = 0x1p-1060;
+
+// Tolerance per coordinate is kCullError times the magnitudes Z + W, where Z = |C - E| + sum e_k |A_k|,
+// mapped with the magnitudes of the dual basis, and W = extent of the (truncated) frustum.  Two parts, u =
+// unit roundoff:
 //
-// 1. The box in floating point is not the given box.  Each of its points is off by at most 13 u Z in each coordinate:
+// 1. The box in floating point is not the given box.  Each of its points is off by at most 13 u Z in each
+// coordinate:
 //    9 (dual basis) + 1 (C - E) + 1 (product) + 2 (sums).
 // 2. For that rounded box a projection on an axis M is off by at most 10 u sum_i |M_i| (Z_i + W_i):
-//    2 (entry of M, relative, thanks to difference_of_products) + 1 (product) + 2 (sums) + 1 (times e) + 2 (sums) for the
-//    box, 2 + 1 + 1 (width) + 2 + 1 (far end) for the frustum, and 2 for the final differences.
+//    2 (entry of M, relative, thanks to difference_of_products) + 1 (product) + 2 (sums) + 1 (times e) + 2
+//    (sums) for the box, 2 + 1 + 1 (width) + 2 + 1 (far end) for the frustum, and 2 for the final
+//    differences.
 //
 // Together 23 u; 32 u leaves room for second-order terms and for the rounding of the bound itself.
 //
-// Why this proves the verdict.  Let the gap along M be the distance between the two projections, < 0 if they overlap.
+// Why this proves the verdict.  Let the gap along M be the distance between the two projections, < 0 if they
+// overlap.
 // - A gap above tol = sum |M_i| tol_i on any axis: the given bodies are disjoint along that axis.
-// - An overlap of at least tol on all axes: let K be the set of differences of points of frustum and rounded box.  The
-//   axes contain all facet normals of K (also for flat boxes), so K contains the brick Q = +-13 u Z.  The given box is
-//   within Q of the rounded one, coordinate by coordinate; were it disjoint from the frustum, some direction would
-//   separate them, and K would lack a point of Q in that direction.
+// - An overlap of at least tol on all axes: let K be the set of differences of points of frustum and rounded
+// box.  The
+//   axes contain all facet normals of K (also for flat boxes), so K contains the brick Q = +-13 u Z.  The
+//   given box is within Q of the rounded one, coordinate by coordinate; were it disjoint from the frustum,
+//   some direction would separate them, and K would lack a point of Q in that direction.
 constexpr double kCullError = 32.0 * kUnitRoundoff;
 
 /// What the axes tested so far say.
@@ -98,11 +120,12 @@ struct Tally {
     }
 };
 
-/// The box in scaled frustum coordinates and lengths in units of its largest one.
+/// The box in scaled frustum coordinates.
 struct LocalBox {
     Vec3 center;
-    Vec3 edge[3];  ///< A_i mapped, without extents, so that boxes of zero extent keep their directions
-    Vec3 half;
+    Vec3 edge[3];  ///< A_i mapped and scaled to about 1, without extents: boxes of zero extent keep their
+                   ///< directions
+    Vec3 half;     ///< extents in units of these edges
     Vec3 bound;    ///< Z above
 };
 
@@ -225,34 +248,46 @@ GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const Orien
     if (length == 0.0) {
         return {CullState::outside, true};  // a single point at the apex
     }
-    const PowerOfTwo unit(-std::ilogb(length));
+    const int exponent = exponent_of(length);
+    const PowerOfTwo unit(-exponent);
     const Vec3 x = unit * offset;
-    const double near = unit * (shrink * frame.near), far = unit * (shrink * frame.far);
+    const Vec3 extents = unit * (shrink * given.half_extents);
 
     LocalBox box;
     box.center = frame.dual * x;
-    box.half = unit * (shrink * given.half_extents);
     box.bound = map_magnitudes(frame.dual, x);
-    const double half[3] = {box.half.x, box.half.y, box.half.z};
+    double half[3] = {extents.x, extents.y, extents.z};
     for (int i = 0; i < 3; ++i) {
-        box.edge[i] = drop_negligible(frame.dual * given.axes.row[i]);
+        const Vec3 edge = frame.dual * given.axes.row[i];
         box.bound = box.bound + half[i] * map_magnitudes(frame.dual, given.axes.row[i]);
+        const int size = exponent_of(largest(edge));
+        box.edge[i] = drop_negligible(PowerOfTwo(-size) * edge);
+        half[i] = PowerOfTwo(size) * half[i];
     }
-    const Vec3 c = box.center;
+    const int size = exponent_of(largest(box.bound));
+    const PowerOfTwo rest(-size);
+    box.center = rest * box.center;
+    box.bound = rest * box.bound;
+    for (double& e : half) e = rest * e;
+    box.half = {half[0], half[1], half[2]};
+    const PowerOfTwo total(-exponent - size);
+    const double near = total * (shrink * frame.near), far = total * (shrink * frame.far);
+    const Vec3 c = box.center, lost = {kLost, kLost, kLost};
+    const Vec3 floor = rest * (map_magnitudes(frame.dual, lost) + lost) + Vec3{kFloor, kFloor, kFloor};
 
     // Near and far.  A box in front of the near plane ends here, so below near <= largest depth of the box.
     const double depth_radius = radius(box, {0.0, 0.0, 1.0});
-    const double depth_bound = kCullError * box.bound.z + kFloor;
+    const double depth_bound = kCullError * box.bound.z + floor.z;
     if (near - (c.z + depth_radius) > depth_bound) {
         return {CullState::outside, true};
     }
-    // Cut the frustum off well beyond the deepest point of the box: that changes nothing for the box, and the far end no
-    // longer multiplies rounding noise by far / near.
+    // Cut the frustum off well beyond the deepest point of the box: that changes nothing for the box, and the
+    // far end no longer multiplies rounding noise by far / near.
     const double cut = std::min(far, 2.0 * (c.z + depth_radius + depth_bound));
-    const double far_end = cut / frame.view, near_end = near / frame.view;  // slanted edges: near_end v to far_end v
+    const double far_end = cut / frame.view,
+                 near_end = near / frame.view;  // slanted edges: near_end v to far_end v
     const Vec3 window = {std::fabs(frame.left[0]) + std::fabs(frame.left[1]),
                          std::fabs(frame.up[0]) + std::fabs(frame.up[2]), frame.view};
-    const Vec3 floor = {kFloor, kFloor, kFloor};
     const Vec3 tolerance = kCullError * (box.bound + far_end * window) + floor;
     const auto error_bound = [&](Vec3 m) { return dot(magnitudes(m), tolerance); };
 
@@ -271,8 +306,8 @@ GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const Orien
     }
 
     Tally axes = planes.axes;
-    // Gap between the projections of the box, center +- r, and of the frustum, whose slanted edges project from
-    // near_end q to far_end q with q in [low, high].
+    // Gap between the projections of the box, center +- r, and of the frustum, whose slanted edges project
+    // from near_end q to far_end q with q in [low, high].
     const auto add = [&](Vec3 m, double r, double low, double high) {
         const double center = dot(m, c);
         const double least = std::min(near_end * low, far_end * low);
@@ -293,10 +328,12 @@ GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const Orien
             std::max(l0, l1) + std::max(u0, u1) + d);
         // L x B_i and U x B_i.
         const Vec3 left_cross = {0.0, -b.z, b.y}, up_cross = {b.z, 0.0, -b.x};
-        const double v0 = frame.up[0] * left_cross.y, v1 = frame.up[2] * left_cross.y, v = frame.view * left_cross.z;
+        const double v0 = frame.up[0] * left_cross.y, v1 = frame.up[2] * left_cross.y,
+                     v = frame.view * left_cross.z;
         add(left_cross, half[j] * std::fabs(dot(left_cross, bj)) + half[k] * std::fabs(dot(left_cross, bk)),
             std::min(v0, v1) + v, std::max(v0, v1) + v);
-        const double w0 = frame.left[0] * up_cross.x, w1 = frame.left[1] * up_cross.x, w = frame.view * up_cross.z;
+        const double w0 = frame.left[0] * up_cross.x, w1 = frame.left[1] * up_cross.x,
+                     w = frame.view * up_cross.z;
         add(up_cross, half[j] * std::fabs(dot(up_cross, bj)) + half[k] * std::fabs(dot(up_cross, bk)),
             std::min(w0, w1) + w, std::max(w0, w1) + w);
     }
@@ -304,10 +341,11 @@ GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const Orien
         return {CullState::outside, true};
     }
 
-    // Slanted edge x B_i.  Near-parallel edges make M tiny; it keeps its relative accuracy by difference_of_products.
-    // Exactly, M . v_k = 0 and M . B_i = 0: neither is computed, for their rounding noise, multiplied by far_end or by the
-    // extent, would be taken for a gap or would hide one.  The other edges of the frustum are v_k plus a step, so they
-    // project to left_step M_a, up_step M_b and their sum, free of cancellation.
+    // Slanted edge x B_i.  Near-parallel edges make M tiny; it keeps its relative accuracy by
+    // difference_of_products. Exactly, M . v_k = 0 and M . B_i = 0: neither is computed, for their rounding
+    // noise, multiplied by far_end or by the extent, would be taken for a gap or would hide one.  The other
+    // edges of the frustum are v_k plus a step, so they project to left_step M_a, up_step M_b and their sum,
+    // free of cancellation.
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         const Vec3 b = box.edge[i], bj = box.edge[j], bk = box.edge[k];
@@ -323,7 +361,8 @@ GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const Orien
             const double most = far_end * std::max(std::max(0.0, p), std::max(q, pq));
             const double least = far_end * std::min(std::min(0.0, p), std::min(q, pq));
             gap[v] = std::max((center - r) - most, least - (center + r));
-            bound[v] = std::fabs(mx) * tolerance.x + std::fabs(my) * tolerance.y + std::fabs(mz) * tolerance.z;
+            bound[v] =
+                std::fabs(mx) * tolerance.x + std::fabs(my) * tolerance.y + std::fabs(mz) * tolerance.z;
         }
         for (int v = 0; v < 4; ++v) {
             axes.add(gap[v], bound[v]);

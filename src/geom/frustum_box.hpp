@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // View frustum against oriented box: outside, across the border, or inside.
 //
-// Paper 2 (Eberly, "Intersection of Orthogonal View Frustum and Oriented Bounding Box Using Separation Axis Testing",
-// 2000), book section 11.12.1, with these changes: side normals use mu for the up direction (the text prints l); windows
-// may be off-centre; edge x edge axes are computed without cancellation; every verdict says whether it is proven.
+// Paper 2 (Eberly, "Intersection of Orthogonal View Frustum and Oriented Bounding Box Using Separation Axis
+// Testing", 2000), book section 11.12.1, with these changes: side normals use mu for the up direction (the
+// text prints l); windows may be off-centre; edge x edge axes are computed without cancellation; every
+// verdict says whether it is proven.
 //
-// Three stages, each for what the one before could not decide: the six planes against the sphere around the box, the six
-// planes against the box, all 26 separating axes.
+// Three stages, each for what the one before could not decide: the six planes against the sphere around the
+// box, the six planes against the box, all 26 separating axes.
 #pragma once
 
 #include <bit>
@@ -37,7 +38,8 @@ struct CullVerdict {
     bool certain = false;  ///< exact arithmetic on the same numbers is proven to give the same state
 };
 
-// ------------------------------------------------------------------------------------------- stages 1 and 2: planes
+// ------------------------------------------------------------------------------------------- stages 1 and 2:
+// planes
 
 /// Planes with outward normals n: a point x is outside if n . (x - origin) > offset.
 struct PlaneLanes {
@@ -66,18 +68,21 @@ inline constexpr double kMaxReach = 0x1p1000;
 /// Added to the square of a radius, so that a radius whose square underflows is not taken for 0.
 inline constexpr double kMinSquaredRadius = 0x1p-900;
 
-// For each plane let s be the signed distance of the centre and r the half width along the normal, of the box or of the
-// sphere around it, grown by the rounding error, `error_per_length * reach + error`.
+// For each plane let s be the signed distance of the centre and r the half width along the normal, of the box
+// or of the sphere around it, grown by the rounding error, `error_per_length * reach + error`.
 //
 //     outside     some s > r         (all of it lies beyond that plane)
 //     inside      all s < -r
 //     intersects  all s < 0 and some s > -r, each by more than the error:  centre inside, some corner outside
 
-/// Four boxes against all planes.  A sphere needs no axes, which are most of a box; it can tell `outside` (0.0) and `inside`
-/// (2.0), else the answer is kUndecided.
-GEOMSRV_INLINE Lanes classify_by_sphere(const CullPlanes& planes, const Lanes (&center)[3], const Lanes (&half)[3]) {
-    const Lanes x = center[0] - planes.origin.x, y = center[1] - planes.origin.y, z = center[2] - planes.origin.z;
-    const Lanes radius = square_root((half[0] * half[0] + half[1] * half[1]) + (half[2] * half[2] + kMinSquaredRadius));
+/// Four boxes against all planes.  A sphere needs no axes, which are most of a box; it can tell `outside`
+/// (0.0) and `inside` (2.0), else the answer is kUndecided.
+GEOMSRV_INLINE Lanes classify_by_sphere(const CullPlanes& planes, const Lanes (&center)[3],
+                                        const Lanes (&half)[3]) {
+    const Lanes x = center[0] - planes.origin.x, y = center[1] - planes.origin.y,
+                z = center[2] - planes.origin.z;
+    const Lanes radius =
+        square_root((half[0] * half[0] + half[1] * half[1]) + (half[2] * half[2] + kMinSquaredRadius));
     // As for boxes below, 2 (e_0 + e_1 + e_2) <= 3.5 radius.
     const Lanes reach = (magnitude(x) + magnitude(y) + magnitude(z)) + 4.0 * radius;
     LaneMask within = reach < Lanes(kMaxReach);
@@ -112,18 +117,22 @@ GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes& planes, const O
         across = across | (error < s + r);
     }
     if (!(reach < kMaxReach)) return kUndecided;
-    return any(beyond) ? std::uint8_t{0} : all(within) ? std::uint8_t{2} : all(centre) && any(across) ? std::uint8_t{1} : kUndecided;
+    return any(beyond)                  ? std::uint8_t{0}
+           : all(within)                ? std::uint8_t{2}
+           : all(centre) && any(across) ? std::uint8_t{1}
+                                        : kUndecided;
 }
 
-// ----------------------------------------------------------------------------------------- stage 3: separating axes
+// ----------------------------------------------------------------------------------------- stage 3:
+// separating axes
 
 /// A frustum in units that make its numbers about 1: the window is [-1, 1] or so, the near depth in [1, 2).
 struct CullFrame {
     Vec3 origin;
-    Mat3 dual;                       ///< world to frustum coordinates, rows scaled by powers of two
-    double left[4], up[4], view;     ///< directions v_k = (left_k, up_k, view) of the four slanted edges
+    Mat3 dual;                        ///< world to frustum coordinates, rows scaled by powers of two
+    double left[4], up[4], view;      ///< directions v_k = (left_k, up_k, view) of the four slanted edges
     double left_step[4], up_step[4];  ///< v of the neighbour along L, along U, minus v_k
-    double near, far;                ///< [m]
+    double near, far;                 ///< [m]
 };
 
 CullFrame cull_frame(const Frustum& frustum);

@@ -2,28 +2,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // Distance from a point to a view frustum, its nearest point and its region; in space and in the plane.
 //
-// Paper 1 (Eberly, "Distance from Point to Orthogonal Frustum", 2000) walks a decision tree of Voronoi regions; book
-// sections 6.3.3 and 10.4.3 repeat it.  Here the same regions come out of one closed form without branches.
+// Paper 1 (Eberly, "Distance from Point to Orthogonal Frustum", 2000) walks a decision tree of Voronoi
+// regions; book sections 6.3.3 and 10.4.3 repeat it.  Here the same regions come out of one closed form
+// without branches.
 //
-//        far   +-----------------------------+       At depth t the frustum is the window low t <= x <= high t,
+//        far   +-----------------------------+       At depth t the frustum is the window low t <= x <= high
+//        t,
 //               \        .                  /        so the squared distance to that slice is
 //                \      . t                /
-//           -----------x------- P         /          (t - z)^2 + sum over sides of excess(x, [low t, high t])^2,
+//           -----------x------- P         /          (t - z)^2 + sum over sides of excess(x, [low t, high
+//           t])^2,
 //                  \                     /
-//            near   +-------------------+            convex in t.  Half its derivative is increasing and consists of
+//            near   +-------------------+            convex in t.  Half its derivative is increasing and
+//            consists of
 //                         .                          straight pieces:
 //                         E
 //     psi(t) = t - z + sum over sides of  low max(low t - x, 0) - high max(x - high t, 0).
 //
-// For a slope k, the piece k (k t - x) is cut off at 0 from above where the window widens away from the axis (min(0, .)),
-// from below where it lies beyond the axis and moves towards the point (max(0, .), only the inner slope of an off-centre
-// window).  So psi = min over S max over T of (t - z + sum over slopes in S and T of k (k t - x)), with S and T subsets of
-// those slopes, and its root is
+// For a slope k, the piece k (k t - x) is cut off at 0 from above where the window widens away from the axis
+// (min(0, .)), from below where it lies beyond the axis and moves towards the point (max(0, .), only the
+// inner slope of an off-centre window).  So psi = min over S max over T of (t - z + sum over slopes in S and
+// T of k (k t - x)), with S and T subsets of those slopes, and its root is
 //
 //     t* = max over S min over T of  (z + sum k x) / (1 + sum k^2).
 //
-// clamped to [near, far].  For windows around the axis there is no T.  No point is near both slopes of a side, so S and T
-// hold at most one slope of a side each.
+// clamped to [near, far].  For windows around the axis there is no T.  No point is near both slopes of a
+// side, so S and T hold at most one slope of a side each.
 #pragma once
 
 #include <cmath>
@@ -33,7 +37,8 @@
 
 namespace geomsrv {
 
-/// A frustum as its numbers: `Sides` is 2 in space (L, U), 1 in the plane (L); coordinate `Sides` is the depth along D.
+/// A frustum as its numbers: `Sides` is 2 in space (L, U), 1 in the plane (L); coordinate `Sides` is the
+/// depth along D.
 template <int Sides>
 struct View {
     static constexpr int kDimension = Sides + 1;
@@ -61,8 +66,8 @@ struct Windows {
     static constexpr int kMin = (min_choices(Kind) * ...), kMax = (max_choices(Kind) * ...);
 };
 
-/// A frustum prepared for distances.  `Number` is Lanes, with every lane the same, or long double where a product might
-/// leave the range of double.
+/// A frustum prepared for distances.  `Number` is Lanes, with every lane the same, or long double where a
+/// product might leave the range of double.
 template <class Number, int Sides>
 struct DistanceFrame {
     static constexpr int kDimension = Sides + 1;
@@ -70,6 +75,7 @@ struct DistanceFrame {
     /// Candidate for the depth of the nearest point: depth * z + sum side[i] * x[i].
     struct Root {
         Number depth, side[Sides];
+        Number code;  ///< region of the sides whose slopes are in S and T
     };
 
     Number origin[kDimension];
@@ -77,12 +83,12 @@ struct DistanceFrame {
     Rows<Number, kDimension> dual;    ///< world to frustum coordinates
     Rows<Number, kDimension> defect;  ///< Gram matrix of the axes minus the identity
     Number low_slope[Sides], high_slope[Sides];
-    Number low[Sides], high[Sides], view;      ///< the same slopes as low / view, high / view, scaled to about 1
+    Number low[Sides], high[Sides], view;  ///< the same slopes as low / view, high / view, scaled to about 1
     Number low_room[Sides], high_room[Sides];  ///< 1 / (|low| + view), 1 / (|high| + view)
     Number near, far;
     Root roots[kMaxRoots];
     Number low_code[Sides], high_code[Sides];  ///< what being beyond low, high adds to the region
-    Number relative_error;  ///< of a distance; see kLowerError for the rest
+    Number relative_error;                     ///< of a distance; see kLowerError for the rest
     Window window[Sides];
     int refinements = 0;  ///< projections needed after the first, see `distance_to_frustum`
 };
@@ -98,9 +104,12 @@ bool is_ordinary(const View<Sides>& view);
 template <class Number, class Call>
 auto with_windows(const DistanceFrame<Number, 1>& frame, Call call) {
     switch (frame.window[0]) {
-        case Window::centred: return call(Windows<Window::centred>{});
-        case Window::around: return call(Windows<Window::around>{});
-        default: return call(Windows<Window::beyond>{});
+        case Window::centred:
+            return call(Windows<Window::centred>{});
+        case Window::around:
+            return call(Windows<Window::around>{});
+        default:
+            return call(Windows<Window::beyond>{});
     }
 }
 template <class Number, class Call>
@@ -184,43 +193,48 @@ struct NearestPoint {
     Number distance, lower, upper, region;
     Coordinates<Number, Sides> offset;  ///< point minus its nearest point, in frustum coordinates
     Mask<Number> inside;                ///< in the closed frustum
-    Mask<Number> in_range;              ///< nothing overflowed or underflowed; only of interest for Lanes
+    Mask<Number> in_range;  ///< nothing overflowed, underflowed, or was lost to rounding altogether
 };
 
-// Errors of a distance, in units u of roundoff; c is the point in frustum coordinates, |c| its length, at most the reach
-// |c_0| + |c_1| + |c_2|; d the distance.
+// Errors of a distance, in units u of roundoff; c is the point in frustum coordinates, |c| its length, at
+// most the reach |c_0| + |c_1| + |c_2|; d the distance.
 //
-// 1. Coordinates: 13 u sum |dual| |P - E| each (9 dual basis, 1 difference, 1 product, 2 sums); as a vector at most
+// 1. Coordinates: 13 u sum |dual| |P - E| each (9 dual basis, 1 difference, 1 product, 2 sums); as a vector
+// at most
 //    13 sqrt(3) 1.04 u |c| <= 23.4 u |c|.
-// 2. Depth: a root r = (z + sum k x) / (1 + sum k^2) is off by at most 11 u of the sum of magnitudes of its terms (8 in
-//    the coefficients, 1 product, 2 sums), and a shift of c by 11 u |c| along its gradient undoes that.  The depth found is
-//    the max over S min over T of such roots, hence the exact one for a point c' near c: where the slopes that are active
-//    at that depth are those of S, T the shift does it; where one becomes inactive on the way, its coordinate stays at the
-//    border and the others go on.  Each side coordinate moves by at most 11 u |c|, and so do the rest together:
-//    |c' - c| <= 11 sqrt(3) u |c| <= 19.1 u |c|.  Projection does not expand, so the point found at that depth is within
-//    2 * 19.1 u |c| of the nearest one.
+// 2. Depth: a root r = (z + sum k x) / (1 + sum k^2) is off by at most 11 u of the sum of magnitudes of its
+// terms (8 in
+//    the coefficients, 1 product, 2 sums), and a shift of c by 11 u |c| along its gradient undoes that.  The
+//    depth found is the max over S min over T of such roots, hence the exact one for a point c' near c: where
+//    the slopes that are active at that depth are those of S, T the shift does it; where one becomes inactive
+//    on the way, its coordinate stays at the border and the others go on.  Each side coordinate moves by at
+//    most 11 u |c|, and so do the rest together: |c' - c| <= 11 sqrt(3) u |c| <= 19.1 u |c|.  Projection does
+//    not expand, so the point found at that depth is within 2 * 19.1 u |c| of the nearest one.
 // 3. Its side coordinates are rounded by 2 u each (slope, product), at most 2 u (|c| + d).
 // 4. Differences, squares, sum, root: 4 u d.
 //
-// The point found is a point of the frustum but for 3, so above only 1, 3 and 4 count: 26 u |c| + 6 u d; below all of them:
-// 64 u |c| + 6 u d.  Axes off orthonormal enlarge part 2 and 3 by 1.05 and part 4 by 1 u.  Rounded up for second-order
-// terms and the rounding of the bounds.
+// The point found is a point of the frustum but for 3, so above only 1, 3 and 4 count: 26 u |c| + 6 u d;
+// below all of them: 64 u |c| + 6 u d.  Axes off orthonormal enlarge part 2 and 3 by 1.05 and part 4 by 1 u.
+// Rounded up for second-order terms and the rounding of the bounds.
 inline constexpr double kUpperError = 32.0 * kUnitRoundoff;
 inline constexpr double kLowerError = 72.0 * kUnitRoundoff;
 inline constexpr double kDistanceError = 8.0 * kUnitRoundoff;
 
-// A point is proven inside if its room exceeds the error of the room: 14 u |c| in each coordinate, 2 u in the products, so
+// A point is proven inside if its room exceeds the error of the room: 14 u |c| in each coordinate, 2 u in the
+// products, so
 // (|k| + 1) 16 u |c| before scaling by 1 / (|k| + 1), which adds 3 u.
 inline constexpr double kRoomError = 20.0 * kUnitRoundoff;
 
-/// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not count.
+/// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not
+/// count.
 inline constexpr double kMinSquare = 0x1p-900, kMaxSquare = 0x1p1000;
 
 /// Distance of p from its nearest point, and the interval that is proven to hold the exact value.
 template <class Kinds, bool Skewed, class Number, int Sides>
 GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, Sides>& frame,
                                                    const Coordinates<Number, Sides>& p,
-                                                   const Coordinates<Number, Sides>& offset, const Number& region) {
+                                                   const Coordinates<Number, Sides>& offset,
+                                                   const Number& region) {
     const Number z = p.at[Sides], none = 0.0;
     Number square = none;
     for (int i = 0; i <= Sides; ++i) {
@@ -230,8 +244,8 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
         }
         square = i == 0 ? offset.at[i] * image : square + offset.at[i] * image;
     }
-    // How far inside: the least scaled distance from the planes.  Sides compare rounded products; rounding is monotonic, so
-    // a point of the closed frustum is never taken for outside.
+    // How far inside: the least scaled distance from the planes.  Sides compare rounded products; rounding is
+    // monotonic, so a point of the closed frustum is never taken for outside.
     Number room = lesser(z - frame.near, frame.far - z);
     Number reach = magnitude(z);
     for (int i = 0; i < Sides; ++i) {
@@ -252,7 +266,8 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
     const Number upper =
         select(reach * Number(kRoomError) < room, none, distance + (reach * Number(kUpperError) + slack));
     const Number square_if_outside = select(inside, Number(1.0), square);
-    const Mask<Number> in_range = (Number(kMinSquare) < square_if_outside) & (square_if_outside < Number(kMaxSquare));
+    const Mask<Number> in_range = (Number(kMinSquare) < square_if_outside) &
+                                  (square_if_outside < Number(kMaxSquare)) & ((none < region) | inside);
     return {distance, lower, upper, select(distance <= none, none, region), offset, inside, in_range};
 }
 
@@ -302,6 +317,7 @@ struct PointDistance {
 
 /// The same in long double, for numbers that are out of range.
 template <int Sides>
-PointDistance<Sides> distance_in_long_double(const DistanceFrame<long double, Sides>& frame, const double* point);
+PointDistance<Sides> distance_in_long_double(const DistanceFrame<long double, Sides>& frame,
+                                             const double* point);
 
 }  // namespace geomsrv
