@@ -133,6 +133,9 @@ def boxes_swept(world: World, horizon: float) -> Aabbs:
             # -inf + inf: a half space that moves for ever; fmin and fmax keep the end that is known.
             lower[moving] = np.fmin(low, np.nextafter(low - slack + path, -np.inf))
             upper[moving] = np.fmax(high, np.nextafter(high + slack + path, np.inf))
+    if horizon > 0.0:
+        lost = list(world.motion_faults)
+        lower[lost], upper[lost] = -np.inf, np.inf
     return Aabbs(lower, upper)
 
 

@@ -46,6 +46,7 @@ MAX_APPROACH_STEPS = 64
 
 NO_DISTANCE = "distance {} is unsupported in this version"
 NO_ROTATION = "first contact of a polygon with angular velocity is unsupported"
+UNPREDICTABLE = "first contact is unsupported: {}"
 NO_MOTION = "first contact of moving solids ({}) is unsupported"
 
 _NO_PAIRS = np.zeros((0, 2), np.int64)
@@ -385,12 +386,16 @@ def _spinning_polygons(world: World, pairs: IntArray) -> tuple[ContactRows, Unsu
     rows.last_time[:] = np.nan
     certain = -_distance_at(world, pairs, np.zeros(len(pairs)), True)[2] >= world.uncertainty[pairs].sum(axis=1)
     rows.upper[~apart & ~certain] = np.inf
-    reason = np.full(int(apart.sum()), NO_ROTATION, dtype=object)
+    return rows, _unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
+
+
+def _unpredictable(world: World, pairs: Unsupported) -> Unsupported:
+    """The same pairs; where it is not known how an object moves, that is the reason."""
     if world.motion_faults:
-        for k, pair in enumerate(pairs[apart].tolist()):
+        for k, pair in enumerate(pairs.pairs.tolist()):
             faults = [world.motion_faults[row] for row in pair if row in world.motion_faults]
-            reason[k] = f"first contact is unsupported: {faults[0]}" if faults else reason[k]
-    return rows, Unsupported(pairs[apart], reason)
+            pairs.reason[k] = UNPREDICTABLE.format(faults[0]) if faults else pairs.reason[k]
+    return pairs
 
 
 def _solid_contacts(
@@ -428,10 +433,6 @@ def _solid_contacts(
         points,
     )
     moving = status == ContactStatus.UNSUPPORTED
-    unsupported = Unsupported.joined(
-        [
-            missing,
-            Unsupported.of_kinds(world, rows.pairs[moving], NO_MOTION),
-        ]
-    )
+    unmoved = _unpredictable(world, Unsupported.of_kinds(world, rows.pairs[moving], NO_MOTION))
+    unsupported = Unsupported.joined([missing, unmoved])
     return ContactRows.joined([answered.take(known | moving), ContactRows.silent(missing.pairs)]), unsupported

@@ -64,8 +64,8 @@ class SceneObject:
     velocity_uncertainty : float
         Radius [m/s] >= 0 by which the linear velocity may be off.  Widens the intervals of first contacts.
     motion_fault : str
-        Why `twist` does not tell how the object moves; empty if it does.  First contacts answer UNSUPPORTED
-        with this text, but for what it is in contact with now.
+        Why `twist` does not tell how the object moves; empty if it does.  It may then go anywhere: first
+        contacts with it answer UNSUPPORTED with this text, but for what it is in contact with now.
     """
 
     id: str
@@ -406,7 +406,8 @@ class Scene:
         poses : (n, 7) float
             x y z [m], qx qy qz qw, fixed frame.
         twists : (n, 6) float, optional
-            vx vy vz [m/s], wx wy wz [rad/s], fixed frame; without it the twists stay as they are.
+            vx vy vz [m/s], wx wy wz [rad/s], fixed frame: taken as they are, without uncertainty or fault.
+            Without it the twists stay as they were.
         stamp : object, optional
             Time of the states; answers carry it.
 
@@ -433,15 +434,9 @@ class Scene:
                 raise SceneError({world.ids[rows[k]]: text for k, text in sorted(faults.items())})
             if len(rows) == 0:
                 return self._version
-            # New arrays: queries under way keep the old ones.
-            moved, turning = world.poses.copy(), world.twists
-            moved[rows] = poses
-            if twists is not None:
-                turning = world.twists.copy()
-                turning[rows] = twists
             self._version += 1
             self._stamp = stamp if stamp is not None else self._stamp
-            self._world = world.moved(moved, turning, self._version, self._stamp)
+            self._world = world.moved(rows, poses, twists, self._version, self._stamp)
             return self._version
 
     def distances(
@@ -625,11 +620,14 @@ class Scene:
         same = len(shapes) == len(old.table.shapes) and all(map(operator.is_, shapes, old.table.shapes))
         # States that came by `set_states` are newer than what the objects were added with.
         source = np.array([-1 if name in self._replaced else old.index.get(name, -1) for name in ids], dtype=np.int64)
-        poses, twists = np.empty((len(ids), 7)), np.empty((len(ids), 6))
+        poses, twists, drift = np.empty((len(ids), 7)), np.empty((len(ids), 6)), np.empty(len(ids))
         kept = source >= 0
-        poses[kept], twists[kept] = old.poses[source[kept]], old.twists[source[kept]]
+        for mine, theirs in ((poses, old.poses), (twists, old.twists), (drift, old.velocity_uncertainty)):
+            mine[kept] = theirs[source[kept]]
         for k in np.flatnonzero(~kept).tolist():
-            poses[k], twists[k] = objects[k].pose, objects[k].twist
+            poses[k], twists[k], drift[k] = objects[k].pose, objects[k].twist, objects[k].velocity_uncertainty
+        faults = {k: objects[k].motion_fault for k in np.flatnonzero(~kept).tolist()}
+        faults |= {k: old.motion_faults.get(row, "") for k, row in enumerate(source.tolist()) if row >= 0}
         index = {name: k for k, name in enumerate(ids)}
         keys = [index[a] * len(ids) + index[b] for a, b in self._allowed if a in index and b in index]
         return World(
@@ -638,8 +636,8 @@ class Scene:
             table=old.table if same else ShapeTable.of(shapes, old.table),
             shape=np.array([number[id(o.shape)] for o in objects], dtype=np.int64),
             uncertainty=np.array([o.uncertainty for o in objects], dtype=np.float64),
-            velocity_uncertainty=np.array([o.velocity_uncertainty for o in objects], dtype=np.float64),
-            motion_faults={k: o.motion_fault for k, o in enumerate(objects) if o.motion_fault},
+            velocity_uncertainty=drift,
+            motion_faults={k: fault for k, fault in faults.items() if fault},
             poses=poses,
             twists=twists,
             allowed=np.array(sorted(keys), dtype=np.int64),

@@ -189,6 +189,13 @@ def gather(vertices: FloatArray, offsets: IntArray, rows: IntArray) -> tuple[Flo
     return vertices[source], ends
 
 
+def _with(values: FloatArray, rows: IntArray, new: FloatArray | float) -> FloatArray:
+    """A copy with other rows: queries under way keep what they have."""
+    out = values.copy()
+    out[rows] = new
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class World:
     """Objects in the order of their ids, all in the fixed frame.
@@ -234,9 +241,17 @@ class World:
         poses, twists = np.zeros((0, 7)), np.zeros((0, 6))
         return cls((), {}, ShapeTable.of(()), rows, nothing, nothing, {}, poses, twists, rows, 0, None)
 
-    def moved(self, poses: FloatArray, twists: FloatArray, version: int, stamp: Any) -> World:
-        """The same objects in other states."""
-        world = replace(self, poses=poses, twists=twists, version=version, stamp=stamp)
+    def moved(self, rows: IntArray, poses: FloatArray, twists: FloatArray | None, version: int, stamp: Any) -> World:
+        """The same objects, the listed ones in other states; without `twists` they go on as before."""
+        world = replace(self, poses=_with(self.poses, rows, poses), version=version, stamp=stamp)
+        if twists is not None:
+            # What was said about how far the old velocities can be trusted is no longer true.
+            world = replace(
+                world,
+                twists=_with(self.twists, rows, twists),
+                velocity_uncertainty=_with(self.velocity_uncertainty, rows, 0.0),
+                motion_faults={row: fault for row, fault in self.motion_faults.items() if row not in rows},
+            )
         # What follows from the objects alone has been found out already.
         for name in ("kinds", "planar", "families"):
             if name in self.__dict__:

@@ -532,6 +532,44 @@ def test_uncertainty_widens_every_interval():
         vague.apply(gs.SceneUpdate(add=[gs.SceneObject("c", square, uncertainty=-1.0)]))
 
 
+def test_uncertain_and_unknown_motion():
+    square = gs.Polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    rest = gs.SceneObject("b", square, at(2.0, 0.0, 0.0))
+
+    def of(**options):
+        return scene_of([gs.SceneObject("a", square, IDENTITY, push, **options), rest]).first_contacts(2.0)
+
+    sure, drifting, lost = of(), of(velocity_uncertainty=0.1), of(motion_fault="nobody knows")
+    assert sure.time[0] == drifting.time[0] == 1.0
+    # Within 2 s the drift adds up to 0.2 m; an honest bound for any velocity from 0.9 to 1.1 m/s.
+    assert drifting.time_lower[0] <= 1.0 / 1.1 and drifting.time_upper[0] >= 1.0 / 0.9
+    assert drifting.time_lower[0] >= 0.79 and drifting.time_upper[0] <= 1.5
+    assert lost.status.tolist() == [ContactStatus.UNSUPPORTED]
+    assert lost.unsupported == [("a", "b", "first contact is unsupported: nobody knows")]
+    # It may go anywhere, so nothing is out of reach; but what it touches now, it touches.
+    far = gs.SceneObject("c", square, at(1e6, 0.0, 0.0))
+    touched = gs.SceneObject("d", square, at(0.5, 0.5, 0.0))
+    for shape in (square, gs.Box((1.0, 1.0, 1.0))):
+        shapes = [gs.SceneObject(o.id, shape, o.pose) for o in (far, touched)]
+        scene = scene_of([gs.SceneObject("a", shape, IDENTITY, motion_fault="nobody knows"), *shapes])
+        answer = scene.first_contacts(1.0)
+        assert dict(zip(answer.ids_b, answer.status.tolist(), strict=True)) == {
+            "c": ContactStatus.UNSUPPORTED,
+            "d": ContactStatus.OVERLAPPING,
+        }
+        assert answer.unsupported == [("a", "c", "first contact is unsupported: nobody knows")]
+        assert rows_of(scene.first_contacts(0.0)) == {("a", "d"): 0}
+        # A twist that comes later tells how it moves, also after the scene has changed.
+        scene.set_states(["a"], [IDENTITY])
+        assert scene["a"].motion_fault == "nobody knows"
+        scene.set_states(["a"], [IDENTITY], [REST])
+        scene.apply(gs.SceneUpdate(add=[gs.SceneObject("e", shape, at(0.0, 1e3, 0.0))]))
+        assert scene["a"].motion_fault == "" and len(scene.first_contacts(1.0)) == 1
+    with pytest.raises(gs.SceneError, match="velocity_uncertainty"):
+        of(velocity_uncertainty=-0.1)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_answers_of_shifted_polygons_lie_within_the_uncertainty(seed):
     rng = np.random.default_rng(seed)
