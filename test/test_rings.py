@@ -8,9 +8,10 @@ import math
 import time
 from fractions import Fraction
 
-import geomsrv as gs
 import numpy as np
 import pytest
+
+import geomsrv as gs
 from geomsrv import _core
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]

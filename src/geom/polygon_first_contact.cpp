@@ -263,10 +263,13 @@ Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
     Timed result;
     result.nominal = rate.value.hi > 0.0 ? quotient(gap.value, rate.value) : DoubleDouble{kInfinity, 0.0};
     const double relative = gap.error / gap.value.hi + rate.error / rate.value.hi;
-    // Below it (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-18).
+    // For x, y below the first (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-19); the second is for rounding of the
+    // bound too.
     constexpr double kSmallRelative = 0x1p-20;
-    if (rate.value.hi > 0.0 && relative < kSmallRelative && result.nominal.hi < kInfinity) {
-        const double error = result.nominal.hi * ((1.0 + 0x1p-18) * relative + kQuotientError);
+    constexpr double kSecondOrder = 1.0 + 0x1p-18;
+    const bool digits_left = gap.value.hi > 0.0 && rate.value.hi > 0.0 && relative < kSmallRelative;
+    if (digits_left && result.nominal.hi < kInfinity) {
+        const double error = result.nominal.hi * (kSecondOrder * relative + kQuotientError);
         result.lower = next_down(result.nominal.hi + (result.nominal.lo - error));
         result.upper = next_up(result.nominal.hi + (result.nominal.lo + error));
         return result;
@@ -327,6 +330,9 @@ Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& 
                    std::span<const AxisOf> axes) {
     Entry entry;
     for (const AxisOf axis : axes) {
+        if (pair.side(axis.side).is_redundant(axis.index)) {
+            continue;
+        }
         const LiteralAxis at = literal(pair, axis, motion, slacks);
         Timed close;
         if (at.is_sharp() && at.gap > 0.0 && at.rate > 0.0) {
@@ -363,6 +369,9 @@ double earliest_exit(const PolygonPair& pair, const Motion& motion, const Slacks
                      std::span<const AxisOf> axes) {
     double exit = kInfinity;
     for (const AxisOf axis : axes) {
+        if (pair.side(axis.side).is_redundant(axis.index)) {
+            continue;
+        }
         const LiteralAxis at = literal(pair, axis, motion, slacks);
         double time = at.gap / at.rate;
         if (!at.is_sharp()) {
@@ -459,11 +468,20 @@ struct Seconds {
     int exponent;
 
     [[nodiscard]] double nearest(double t) const { return exponent == 0 ? t : std::scalbn(t, exponent); }
-    [[nodiscard]] double down(double t) const {
-        return exponent == 0 ? t : std::max(0.0, next_down(nearest(t)));
-    }
-    [[nodiscard]] double up(double t) const { return exponent == 0 ? t : next_up(nearest(t)); }
     [[nodiscard]] double inverse(double t) const { return exponent == 0 ? t : std::scalbn(t, -exponent); }
+    [[nodiscard]] double down(double t) const {
+        const double time = nearest(t);
+        return is_rounded(time, t) ? std::max(0.0, next_down(time)) : time;
+    }
+    [[nodiscard]] double up(double t) const {
+        const double time = nearest(t);
+        return is_rounded(time, t) ? next_up(time) : time;
+    }
+
+private:
+    [[nodiscard]] bool is_rounded(double time, double t) const {
+        return exponent != 0 && t != 0.0 && time < std::numeric_limits<double>::min();
+    }
 };
 
 }  // namespace

@@ -71,6 +71,9 @@ struct PairedPolygon {
     }
     [[nodiscard]] Vec2 axis(std::size_t k) const { return {dx[k], dy[k]}; }
     [[nodiscard]] Vec2 local(std::size_t vertex) const { return {x[vertex], y[vertex]}; }
+    /// The tip of a polygon with area: it keeps slacks small, but the edges alone say the same in exact
+    /// arithmetic.
+    [[nodiscard]] bool is_redundant(std::size_t k) const { return edges > 2 && k >= edges; }
     /// Own support along an axis.
     [[nodiscard]] double own(std::size_t k) const { return dot(axis(k), local(k)); }
 };
