@@ -74,7 +74,12 @@ def test_every_limit_is_enforced_by_name(setting) -> None:
         bad += [1, True]
         bad += ["no such choice"] if setting.choices else []
     else:
-        bad = [[0.0] * (setting.length - 1), [math.nan] * setting.length, ["x"] * setting.length, [2.0] * setting.length]
+        bad = [
+            [0.0] * (setting.length - 1),
+            [math.nan] * setting.length,
+            ["x"] * setting.length,
+            [2.0] * setting.length,
+        ]
     for value in bad:
         with pytest.raises(GeometryError, match=re.escape(setting.name)):
             Config().changed({setting.name: value})

@@ -1,0 +1,593 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Requests to responses, on plain objects: no ROS is needed to answer."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from plain_messages import message, request, response
+
+import geomsrv as gs
+from geomsrv.config import Config
+from geomsrv.engine import Engine
+from geomsrv.ros import convert
+from geomsrv.ros.handlers import Handlers
+
+OK, BAD_REQUEST, UNSUPPORTED, NOT_AVAILABLE, NOT_ACTIVE, INTERNAL_ERROR = range(6)
+BY_IDS, INLINE, ALL = range(3)
+D = convert.doubles
+IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+CAMERA = gs.Frustum([0, 0, -5], np.eye(3), 1.0, 1.0, 1.0, 20.0)
+
+
+def obj(name, shape, position=(0, 0, 0), velocity=(0, 0, 0), **fields):
+    return gs.SceneObject(name, shape, (*position, 0, 0, 0, 1), (*velocity, 0, 0, 0), **fields)
+
+
+SQUARE = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
+OBJECTS = [
+    obj("ball", gs.Sphere(0.5), (2, 0, 0)),
+    obj("box", gs.Box([1, 1, 1])),
+    obj("far", gs.Sphere(0.25), (0, 9, 0)),
+    obj("left", SQUARE, (0, 0, 0), (1, 0, 0)),
+    obj("right", SQUARE, (3, 0.5, 0)),
+    obj("cone", gs.Cone(0.5, 1.0), (0, 0, 4)),
+]
+
+
+class Desk:
+    """Handlers over an engine, with what they log."""
+
+    def __init__(self, **changes) -> None:
+        self.engine = Engine(Config().changed({name.replace("__", "."): value for name, value in changes.items()}))
+        self.active, self.logged = True, []
+        self.handlers = Handlers(self.engine, lambda: self.active, self.logged.append, message("geomsrv/SceneObject"))
+        self.engine.apply(gs.SceneUpdate(add=OBJECTS))
+        self.engine.camera = CAMERA
+
+    def ask(self, service, **fields):
+        name = "".join(f"_{c.lower()}" if c.isupper() else c for c in service).lstrip("_")
+        return getattr(self.handlers, name)(request(service, **fields), response(service))
+
+
+@pytest.fixture
+def desk():
+    return Desk()
+
+
+def shapes(*items):
+    sent = [message("geomsrv/Shape")() for _ in items]
+    for target, shape in zip(sent, items, strict=True):
+        convert.set_shape(target, shape)
+    return sent
+
+
+def at(*positions):
+    return D([[*p, 0, 0, 0, 1] for p in positions])
+
+
+def frustum(camera=CAMERA):
+    sent = message("geomsrv/Frustum")()
+    convert.set_frustum(sent, camera)
+    return sent
+
+
+def is_empty(answer) -> bool:
+    """Nothing but status and message is filled."""
+    fresh = type(answer)()
+    return all(
+        value == getattr(fresh, name) for name, value in vars(answer).items() if name not in ("status", "message")
+    )
+
+
+# ------------------------------------------------------------------------------------------------------- distance
+
+
+def test_distance_by_ids(desk) -> None:
+    got = desk.ask("Distance", select=BY_IDS, ids_a=["ball", "box"], ids_b=["box", "ball"], want=["witness"])
+    assert (got.status, got.message) == (OK, "")
+    assert got.ids_a == ["ball", "box"] and got.ids_b == ["box", "ball"]
+    assert got.distance.tolist() == [0.5, 0.5] and got.item_status.tolist() == [0, 0]
+    assert got.point_a.tolist() == [1.5, 0, 0, 1, 0, 0] and got.point_b.tolist() == [1, 0, 0, 1.5, 0, 0]
+    assert got.normal.tolist() == [-1, 0, 0, 1, 0, 0]
+    assert all(low <= 0.5 <= high for low, high in zip(got.lower, got.upper, strict=True))
+    assert got.scene_version == desk.engine.scene.version and got.cost.accuracy == "float64"
+    assert list(got.cost.stages) == ["narrow box-sphere"] and got.cost.counts.tolist() == [2]
+
+
+def test_distance_of_one_against_many_and_without_witness(desk) -> None:
+    got = desk.ask("Distance", select=BY_IDS, ids_a=["box"], ids_b=["ball", "far", "ball"])
+    assert got.distance.tolist() == [0.5, 7.75, 0.5]
+    assert got.ids_a == ["box"] * 3
+    assert len(got.point_a) == len(got.point_b) == len(got.normal) == 0
+
+
+def test_distance_of_allowed_pairs_is_answered_when_asked_for(desk) -> None:
+    desk.engine.apply(gs.SceneUpdate(allow=[("ball", "box")]))
+    assert desk.ask("Distance", select=BY_IDS, ids_a=["ball"], ids_b=["box"]).distance.tolist() == [0.5]
+    every = desk.ask("Distance", select=ALL, max_distance=math.inf)
+    assert ("ball", "box") not in set(zip(every.ids_a, every.ids_b, strict=True))
+
+
+def test_distance_to_the_nearest_other_object(desk) -> None:
+    got = desk.ask("Distance", select=BY_IDS, ids_a=["far", "box", "left"], want=["witness"])
+    assert got.status == OK
+    assert list(zip(got.ids_a, got.ids_b, strict=True)) == [("far", "box"), ("box", "ball"), ("left", "right")]
+    assert got.distance.tolist() == [7.75, 0.5, 2.0]
+    assert got.normal.tolist()[:3] == [0, -1, 0], "from the object asked about"
+    desk.engine.apply(gs.SceneUpdate(remove=["right"]))
+    alone = desk.ask("Distance", select=BY_IDS, ids_a=["left", "far"])
+    assert alone.status == UNSUPPORTED and "'left' has no object to be compared with" in alone.message
+    assert alone.ids_a == ["far"]
+
+
+def test_distance_inline(desk) -> None:
+    got = desk.ask(
+        "Distance",
+        select=INLINE,
+        shapes_a=shapes(gs.Sphere(1.0)),
+        poses_a=at((0, 0, 0)),
+        shapes_b=shapes(gs.Sphere(1.0), gs.Box([1, 1, 1]), gs.Sphere(1.0)),
+        poses_b=at((3, 0, 0), (0, 5, 0), (1.5, 0, 0)),
+        want=["distance", "penetration"],
+    )
+    assert got.status == OK and got.ids_a == [] and got.scene_version == 0
+    assert got.distance.tolist() == [1.0, 3.0, -0.5]
+
+
+def test_distance_of_all_pairs_nearest_first(desk) -> None:
+    got = desk.ask("Distance", select=ALL, max_distance=8.0, want=["witness"])
+    found = list(zip(got.ids_a, got.ids_b, got.distance, strict=True))
+    assert found[:3] == [("ball", "box", 0.5), ("left", "right", 2.0), ("box", "far", 7.75)]
+    assert got.status == UNSUPPORTED and "cone" in got.message
+    assert all(status == 2 and math.isnan(d) for status, d in zip(got.item_status[3:], got.distance[3:], strict=True))
+    assert {b for _, b, _ in found[3:]} | {a for a, _, _ in found[3:]} >= {"cone"}
+    desk.engine.apply(gs.SceneUpdate(remove=["cone"]))
+    rest = desk.ask("Distance", select=ALL, max_distance=0.6)
+    assert rest.status == OK and rest.distance.tolist() == [0.5]
+    assert "never" in rest.message, "polygons and solids are not compared, and the message says so"
+
+
+def test_unsupported_pairs_are_named_and_the_others_answered(desk) -> None:
+    got = desk.ask("Distance", select=BY_IDS, ids_a=["ball", "ball", "ball"], ids_b=["cone", "box", "left"])
+    assert got.status == UNSUPPORTED
+    assert "distance cone-sphere is unsupported" in got.message and "polygons" in got.message
+    assert got.item_status.tolist() == [2, 0, 2] and got.distance[1] == 0.5 and math.isnan(got.distance[0])
+
+
+# -------------------------------------------------------------------------------------------------- first contact
+
+
+def test_first_contact_by_ids(desk) -> None:
+    got = desk.ask(
+        "FirstContact",
+        select=BY_IDS,
+        ids_a=["left", "right"],
+        ids_b=["right", "left"],
+        horizon=5.0,
+        want=["contact_set"],
+    )
+    assert got.status == OK and got.item_status.tolist() == [1, 1]
+    assert got.time.tolist() == [2.0, 2.0] and got.last_time.tolist() == [4.0, 4.0]
+    assert got.normal.tolist() == [1, 0, 0, -1, 0, 0]
+    assert got.point_offsets.tolist() == [0, 2, 4]
+    assert got.points.tolist()[:6] == [3, 0.5, 0, 3, 1, 0]
+    assert all(low <= 2.0 <= high for low, high in zip(got.time_lower, got.time_upper, strict=True))
+
+
+def test_first_contact_never_and_without_points(desk) -> None:
+    got = desk.ask("FirstContact", select=BY_IDS, ids_a=["left"], ids_b=["right"], horizon=1.0)
+    assert got.item_status.tolist() == [0] and math.isnan(got.time[0])
+    assert len(got.points) == len(got.point_offsets) == 0
+
+
+def test_first_contact_inline_with_twists(desk) -> None:
+    fields = {
+        "select": INLINE,
+        "shapes_a": shapes(SQUARE),
+        "poses_a": at((0, 0, 0)),
+        "shapes_b": shapes(SQUARE),
+        "poses_b": at((3, 0, 0)),
+        "horizon": math.inf,
+    }
+    assert desk.ask("FirstContact", **fields).item_status.tolist() == [0], "at rest"
+    moving = desk.ask("FirstContact", **fields, twists_a=D([0.5, 0, 0, 0, 0, 0]), twists_b=D([-0.5, 0, 0, 0, 0, 0]))
+    assert moving.time.tolist() == [2.0] and moving.status == OK
+    turning = desk.ask("FirstContact", **fields, twists_a=D([0.5, 0, 0, 0, 0, 0.1]))
+    assert turning.status == UNSUPPORTED and "angular velocity" in turning.message
+    assert turning.item_status.tolist() == [4] and math.isnan(turning.time[0])
+
+
+def test_first_contact_of_all_pairs(desk) -> None:
+    got = desk.ask("FirstContact", select=ALL, horizon=5.0, want=["contact_set", "first_contact"])
+    pairs = dict(zip(zip(got.ids_a, got.ids_b, strict=True), got.item_status, strict=True))
+    assert got.status == OK and pairs == {("left", "right"): 1}, "the cone is too far away to matter"
+    desk.engine.apply(gs.SceneUpdate(add=[obj("cone", gs.Cone(0.5, 1.0), (0, 0, 1))]))
+    got = desk.ask("FirstContact", select=ALL, horizon=5.0)
+    assert got.status == UNSUPPORTED and "cone" in got.message and 4 in got.item_status
+    desk.engine.apply(gs.SceneUpdate(remove=["cone"], add=[obj("deep", gs.Box([1, 1, 1]), (0.5, 0, 0))]))
+    now = desk.ask("FirstContact", select=ALL, horizon=5.0)
+    assert now.status == OK and now.time.tolist() == sorted(now.time)
+    assert ("box", "deep") == (now.ids_a[0], now.ids_b[0]) and now.item_status[0] == 3 and now.time[0] == 0.0
+
+
+def test_uncertain_polygons_answer_wider_intervals(desk) -> None:
+    desk.engine.apply(gs.SceneUpdate(add=[obj("left", SQUARE, (0, 0, 0), (1, 0, 0), uncertainty=1e-3)]))
+    got = desk.ask("FirstContact", select=BY_IDS, ids_a=["right"], ids_b=["left"], horizon=5.0, want=["contact_set"])
+    assert got.time_lower[0] <= 1.999 and got.time_upper[0] >= 2.001 and got.time[0] == 2.0
+    assert got.normal.tolist() == [-1, 0, 0] and len(got.points) == 6
+
+
+# ----------------------------------------------------------------------------------------------------------- cull
+
+
+def test_cull_by_ids_inline_and_all(desk) -> None:
+    everything = desk.ask("Cull", select=ALL)
+    assert everything.status == OK and everything.ids == sorted(o.id for o in OBJECTS)
+    state = dict(zip(everything.ids, everything.states, strict=True))
+    assert (state["box"], state["far"]) == (gs.INSIDE, gs.OUTSIDE)
+    some = desk.ask("Cull", select=BY_IDS, ids=["far", "box", "far"], view=1, frustum=frustum())
+    assert some.states.tolist() == [0, 2, 0] and some.certain.tolist() == [1, 1, 1]
+    assert some.ids == ["far", "box", "far"]
+    own = desk.ask(
+        "Cull", select=INLINE, shapes=shapes(gs.Box([1, 1, 1]), gs.Box([9, 9, 9])), poses=at((0, 0, 0), (0, 0, 0))
+    )
+    assert own.states.tolist() == [2, 1] and own.ids == [] and own.scene_version == 0
+
+
+def test_cull_without_a_camera_is_not_available(desk) -> None:
+    desk.engine.camera = None
+    got = desk.ask("Cull", select=ALL)
+    assert got.status == NOT_AVAILABLE and "no ~/camera_info has come yet" in got.message and is_empty(got)
+
+
+# -------------------------------------------------------------------------------------------------------- batches
+
+
+def test_cull_batch_is_cull(desk) -> None:
+    rng = np.random.default_rng(5)
+    boxes = gs.Boxes(rng.uniform(-4, 4, (50, 3)), np.tile(np.eye(3), (50, 1, 1)), rng.uniform(0.1, 1, (50, 3)))
+    got = desk.ask(
+        "CullBatch",
+        frustum=D(CAMERA.packed()),
+        centers=D(boxes.center),
+        axes=D(boxes.axes),
+        half_extents=D(boxes.half_extents),
+    )
+    want = gs.cull(CAMERA, boxes)
+    assert (
+        got.status == OK
+        and got.states.tolist() == want.state.tolist()
+        and got.certain.tolist() == want.certain.tolist()
+    )
+    assert set(got.states) == {0, 1, 2}
+
+
+POLYGON, BOXES, POLYGONS, POLYTOPES, FRUSTUM, POINTS = 14, 101, 102, 103, 104, 105
+
+
+def test_distance_batch_of_batches(desk) -> None:
+    boxes = [0, 0, 0, *np.eye(3).ravel(), 1, 1, 1]
+    away = [4, 0, 0, *np.eye(3).ravel(), 1, 1, 1]
+    got = desk.ask(
+        "DistanceBatch", kind_a=BOXES, values_a=D(boxes), kind_b=BOXES, values_b=D(away + boxes), want=["witness"]
+    )
+    assert got.distance.tolist() == [2.0, 0.0] and got.point_a.tolist()[:1] == [1.0] and len(got.normal) == 6
+    rings = {"values_a": D([0, 0, 1, 0, 0, 1]), "offsets_a": convert.uint32s([0, 3])}
+    flat = desk.ask(
+        "DistanceBatch",
+        kind_a=POLYGONS,
+        kind_b=POLYGONS,
+        values_b=D([3, 0, 4, 0, 3, 1, 1, 1]),
+        offsets_b=convert.uint32s([0, 3, 4]),
+        want=["witness"],
+        **rings,
+    )
+    assert flat.status == OK and np.allclose(flat.distance, [2.0, math.sqrt(0.5)]) and len(flat.point_a) == 4
+    hulls = desk.ask(
+        "DistanceBatch",
+        kind_a=FRUSTUM,
+        values_a=D(CAMERA.packed()),
+        kind_b=POLYTOPES,
+        values_b=D([0, 0, -7, 0, 0, -8]),
+        offsets_b=convert.uint32s([0, 2]),
+    )
+    assert np.allclose(hulls.distance, [3.0]) and len(hulls.region) == 0
+
+
+def test_distance_batch_of_points_and_a_frustum(desk) -> None:
+    points = np.array([[0, 0, -4.5], [0, 0, 0], [9, 0, 0.0]])
+    got = desk.ask("DistanceBatch", kind_a=FRUSTUM, values_a=D(CAMERA.packed()), kind_b=POINTS, values_b=D(points))
+    want = gs.distance_to_frustum(CAMERA, points)
+    assert got.distance.tolist() == want.distance.tolist() and got.region.tolist() == want.region.tolist()
+
+
+def test_distance_batch_of_shapes_at_many_poses(desk) -> None:
+    poses = at((4, 0, 0), (0, 3, 0), (1.5, 0, 0))
+    sphere_box = {"kind_a": 1, "values_a": D([1.0]), "kind_b": 6, "values_b": D([1, 1, 1]), "poses_ab": poses}
+    got = desk.ask("DistanceBatch", **sphere_box, want=["penetration"])
+    assert got.status == OK and got.distance.tolist() == [2.0, 1.0, -0.5]
+    tetrahedron = D([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
+    hull = desk.ask(
+        "DistanceBatch", kind_a=1, values_a=D([1.0]), kind_b=8, values_b=tetrahedron, poses_ab=at((3, 0, 0))
+    )
+    assert np.allclose(hull.distance, 2.0)
+    cone = desk.ask("DistanceBatch", kind_a=1, values_a=D([1.0]), kind_b=4, values_b=D([1, 1]), poses_ab=poses)
+    assert cone.status == UNSUPPORTED and "sphere-cone" in cone.message and cone.item_status.tolist() == [2, 2, 2]
+
+
+def test_first_contact_batch(desk) -> None:
+    fields = {
+        "vertices_a": D([0, 0, 1, 0, 1, 1, 0, 1]),
+        "offsets_a": convert.uint32s([0, 4]),
+        "vertices_b": D([3, 0.5, 4, 0.5, 4, 1.5, 3, 1.5, 0, 5]),
+        "offsets_b": convert.uint32s([0, 4, 5]),
+        "velocities_a": D([1, 0]),
+        "velocities_b": D([0, 0]),
+        "t_max": 10.0,
+    }
+    got = desk.ask("FirstContactBatch", **fields, want=["contact_set"])
+    assert got.item_status.tolist() == [1, 0] and got.time[0] == 2.0 and got.last_time[0] == 4.0
+    assert got.points.tolist() == [3, 0.5, 3, 1] and got.point_offsets.tolist() == [0, 2, 2]
+    assert got.normal.tolist()[:2] == [1, 0]
+    solid = desk.ask(
+        "FirstContactBatch",
+        dimension=3,
+        vertices_a=D([0, 0, 0]),
+        offsets_a=convert.uint32s([0, 1]),
+        vertices_b=D([3, 0, 0]),
+        offsets_b=convert.uint32s([0, 1]),
+        velocities_a=D([1, 0, 0]),
+        velocities_b=D([0, 0, 0]),
+    )
+    assert solid.status == UNSUPPORTED and "polytopes" in solid.message and solid.item_status.tolist() == [4]
+
+
+# ---------------------------------------------------------------------------------------------------------- scene
+
+
+def test_apply_and_get_scene(desk) -> None:
+    got = desk.ask("GetScene")
+    assert got.status == OK and [item.id for item in got.scene.add] == sorted(o.id for o in OBJECTS)
+    assert got.scene.header.frame_id == "world" and got.version == desk.engine.scene.version
+    other = Desk()
+    assert other.ask("ApplyScene", update=message("geomsrv/SceneUpdate")(clear=True)).status == OK
+    again = other.ask("ApplyScene", update=got.scene)
+    assert again.status == OK and again.version == other.engine.scene.version
+    assert other.ask("GetScene").scene == got.scene, "the scene rebuilds itself"
+    assert [item.id for item in desk.ask("GetScene", ids=["far", "ball"]).scene.add] == ["far", "ball"]
+
+
+def test_refused_updates_name_every_object_and_change_nothing(desk) -> None:
+    before, version = desk.ask("GetScene").scene, desk.engine.scene.version
+    update = message("geomsrv/SceneUpdate")(remove=["nobody", "ball"], allow_a=["x"], allow_b=["x"])
+    got = desk.ask("ApplyScene", update=update)
+    assert got.status == BAD_REQUEST and got.ids == ["nobody", "x"] and all(got.faults)
+    assert got.version == version == desk.engine.scene.version and desk.ask("GetScene").scene == before
+    assert "nobody" in got.message
+    bad = message("geomsrv/SceneObject")(id="bad")
+    shape = desk.ask("ApplyScene", update=message("geomsrv/SceneUpdate")(add=[bad]))
+    assert shape.ids == ["bad"] and shape.faults == ["shape: type 0 is not set"]
+    assert desk.ask("GetScene", ids=["nobody"]).status == BAD_REQUEST
+
+
+def test_clear_and_self_check(desk) -> None:
+    trigger = message("std_srvs/Trigger_Response")
+    assert desk.handlers.clear(None, trigger()).success and len(desk.engine.scene) == 0
+    report = desk.handlers.self_check(None, trigger())
+    assert report.message and isinstance(report.success, bool)
+
+
+# --------------------------------------------------------------------------------------------------- bad requests
+
+SPHERE_AT = {"shapes_a": shapes(gs.Sphere(1.0)), "poses_a": at((0, 0, 0)), "shapes_b": shapes(gs.Sphere(1.0))}
+BOX = [0, 0, 0, *np.eye(3).ravel(), 1, 1, 1]
+BAD = [
+    ("Distance", {"select": BY_IDS, "ids_a": ["ball"], "ids_b": ["nobody"]}, r"ids_b\[0\] is 'nobody': no such object"),
+    ("Distance", {"select": BY_IDS, "ids_a": ["ball", "box"], "ids_b": ["far"] * 3}, "2 and 3 items"),
+    ("Distance", {"select": BY_IDS, "ids_a": ["ball"], "ids_b": ["ball"]}, "'ball' with itself"),
+    ("Distance", {"select": BY_IDS, "ids_a": ["nobody"]}, "nobody"),
+    ("Distance", {"select": 3}, "select must be"),
+    ("Distance", {"select": BY_IDS, "ids_a": ["ball"], "poses_a": at((0, 0, 0))}, "poses_a must be empty here"),
+    ("Distance", {"select": INLINE, "ids_a": ["ball"]}, "ids_a must be empty here"),
+    ("Distance", {"select": ALL, "ids_a": ["ball"]}, "ids_a must be empty here"),
+    ("Distance", {"select": ALL, "max_distance": math.nan}, "max_distance"),
+    ("Distance", {"select": ALL, "max_distance": -1.0}, "max_distance must be >= 0"),
+    ("Distance", {"select": ALL, "want": ["everything"]}, "want must name"),
+    ("Distance", {"select": ALL, "accuracy": "best"}, "accuracy must be one of"),
+    ("Distance", {"select": INLINE, **SPHERE_AT}, "shapes_b are 1, poses_b are of 0"),
+    ("Distance", {"select": INLINE, **SPHERE_AT, "poses_b": at((math.nan, 0, 0))}, r"poses_b\[0, 0\] is nan"),
+    ("Distance", {"select": INLINE, **SPHERE_AT, "poses_b": D([0.0] * 7)}, r"poses_b\[0\] quaternion"),
+    ("Distance", {"select": INLINE, **SPHERE_AT, "poses_b": D([0.0] * 6)}, "poses_b must hold 7 numbers per item"),
+    (
+        "Distance",
+        {"select": INLINE, **SPHERE_AT, "shapes_b": [message("geomsrv/Shape")()], "poses_b": at((0, 0, 0))},
+        r"shapes_b\[0\]: type 0 is not set",
+    ),
+    ("FirstContact", {"select": BY_IDS, "ids_a": ["left"], "ids_b": ["nobody"]}, "nobody"),
+    (
+        "FirstContact",
+        {"select": BY_IDS, "ids_a": ["left"], "ids_b": ["right"], "horizon": -1.0},
+        "horizon must be >= 0",
+    ),
+    ("FirstContact", {"select": ALL, "horizon": math.nan}, "horizon"),
+    ("FirstContact", {"select": ALL, "want": ["distance"]}, "want must name"),
+    ("FirstContact", {"select": ALL, "twists_b": D([0.0] * 6)}, "twists_b must be empty here"),
+    (
+        "FirstContact",
+        {"select": INLINE, **SPHERE_AT, "poses_b": at((3, 0, 0)), "twists_a": D([0.0] * 5)},
+        "twists_a must hold 6 numbers per item",
+    ),
+    (
+        "FirstContact",
+        {"select": INLINE, **SPHERE_AT, "poses_b": at((3, 0, 0)), "twists_a": D([math.nan] * 6)},
+        r"twists_a\[0, 0\] is nan",
+    ),
+    (
+        "FirstContact",
+        {"select": INLINE, **SPHERE_AT, "shapes_b": shapes(SQUARE), "poses_b": at((3, 0, 1))},
+        r"poses_b\[0\]: a polygon lies in the plane",
+    ),
+    ("Cull", {"select": 5}, "select must be BY_IDS, INLINE or ALL"),
+    ("Cull", {"select": ALL, "view": 2}, "view must be CAMERA or FRUSTUM"),
+    ("Cull", {"select": ALL, "view": 1}, "bounds"),
+    ("Cull", {"select": BY_IDS, "ids": ["nobody"]}, "nobody"),
+    ("Cull", {"select": ALL, "ids": ["ball"]}, "ids must be empty here"),
+    ("Cull", {"select": INLINE, "shapes": shapes(gs.Sphere(1.0))}, "shapes are 1, poses are of 0"),
+    ("CullBatch", {}, "frustum must hold 18 numbers, got 0"),
+    ("CullBatch", {"frustum": D(CAMERA.packed()), "centers": D([0, 0])}, "centers must hold 3 numbers"),
+    ("CullBatch", {"frustum": D(CAMERA.packed()), "centers": D([0, 0, 0])}, r"axes must have shape \(1, 3, 3\)"),
+    ("DistanceBatch", {}, "kind_a 0|type 0"),
+    ("DistanceBatch", {"kind_a": BOXES, "values_a": D(BOX), "kind_b": 1, "values_b": D([1.0])}, "must both be"),
+    (
+        "DistanceBatch",
+        {"kind_a": BOXES, "values_a": D(BOX), "kind_b": POINTS, "values_b": D([0, 0, 0])},
+        "needs kind_a FRUSTUM",
+    ),
+    ("DistanceBatch", {"kind_a": POINTS, "values_a": D([0, 0, 0]), "kind_b": BOXES, "values_b": D(BOX)}, "kind_a 105"),
+    ("DistanceBatch", {"kind_a": BOXES, "values_a": D(BOX[:-1]), "kind_b": BOXES}, "values_a must hold 15 numbers"),
+    (
+        "DistanceBatch",
+        {"kind_a": BOXES, "values_a": D(BOX), "offsets_a": convert.uint32s([0, 1]), "kind_b": BOXES},
+        "offsets_a must be empty here",
+    ),
+    (
+        "DistanceBatch",
+        {"kind_a": BOXES, "values_a": D(BOX), "kind_b": BOXES, "values_b": D(BOX), "poses_ab": at((0, 0, 0))},
+        "poses_ab must be empty here",
+    ),
+    (
+        "DistanceBatch",
+        {
+            "kind_a": FRUSTUM,
+            "values_a": D(CAMERA.packed()),
+            "kind_b": POINTS,
+            "values_b": D([0, 0, 0]),
+            "want": ["penetration"],
+        },
+        "want must name",
+    ),
+    ("FirstContactBatch", {"dimension": 4}, "dimension must be 2 or 3, got 4"),
+    (
+        "FirstContactBatch",
+        {
+            "vertices_a": D([0, 0, 0, 1, 1, 0]),
+            "offsets_a": convert.uint32s([0, 3]),
+            "vertices_b": D([0, 0]),
+            "offsets_b": convert.uint32s([0, 1]),
+            "velocities_a": D([0, 0]),
+            "velocities_b": D([0, 0]),
+        },
+        "ring 0 is clockwise",
+    ),
+    (
+        "FirstContactBatch",
+        {
+            "vertices_a": D([0, 0]),
+            "offsets_a": convert.uint32s([0, 2]),
+            "vertices_b": D([]),
+            "offsets_b": convert.uint32s([0]),
+        },
+        "offsets",
+    ),
+]
+
+
+@pytest.mark.parametrize(("service", "fields", "text"), BAD, ids=[f"{s}-{i}" for i, (s, _, _) in enumerate(BAD)])
+def test_bad_requests_are_answered_by_name(desk, service, fields, text) -> None:
+    before, version = desk.ask("GetScene").scene, desk.engine.scene.version
+    got = desk.ask(service, **fields)
+    assert got.status == BAD_REQUEST, got
+    assert re.search(text, got.message), got.message
+    assert is_empty(got) and not desk.logged
+    assert desk.engine.scene.version == version and desk.ask("GetScene").scene == before
+
+
+QUERIES = ["Cull", "Distance", "FirstContact", "CullBatch", "DistanceBatch", "FirstContactBatch"]
+
+
+@pytest.mark.parametrize("service", QUERIES)
+def test_what_is_not_there_yet_is_named(desk, service) -> None:
+    for fields, text in (
+        ({"tolerance": 1e-3}, "tolerance=0.001 is not available yet"),
+        ({"tolerance": math.nan}, "tolerance=nan is not available yet"),
+        ({"accuracy": "exact"}, "accuracy='exact' is not available yet"),
+    ):
+        got = desk.ask(service, **fields)
+        assert got.status == NOT_AVAILABLE and text in got.message and is_empty(got)
+
+
+@pytest.mark.parametrize(
+    ("effect", "service", "fields"),
+    [
+        ("cull", "Cull", {"select": ALL}),
+        ("cull", "CullBatch", {}),
+        ("distance", "Distance", {"select": ALL}),
+        ("witness", "Distance", {"select": ALL, "want": ["witness"]}),
+        ("penetration", "Distance", {"select": ALL, "want": ["penetration"]}),
+        ("witness", "DistanceBatch", {"want": ["witness"]}),
+        ("first_contact", "FirstContact", {"select": ALL}),
+        ("contact_set", "FirstContact", {"select": ALL, "want": ["contact_set"]}),
+        ("first_contact", "FirstContactBatch", {}),
+    ],
+)
+def test_effects_that_are_switched_off_are_named(effect, service, fields) -> None:
+    got = Desk(**{f"effects__{effect}": False}).ask(service, **fields)
+    assert got.status == NOT_AVAILABLE and f"effects.{effect}" in got.message and is_empty(got)
+
+
+@pytest.mark.parametrize("service", QUERIES)
+def test_inactive_nodes_say_so(desk, service) -> None:
+    desk.active = False
+    got = desk.ask(service)
+    assert got.status == NOT_ACTIVE and got.message and is_empty(got)
+    assert desk.ask("GetScene").status == OK, "the scene can be read and written"
+    assert desk.ask("ApplyScene").status == OK
+
+
+@pytest.mark.parametrize("service", [*QUERIES, "ApplyScene", "GetScene"])
+def test_faults_of_ours_are_answered_and_logged(desk, service, monkeypatch) -> None:
+    def broken(*_, **__):
+        raise ZeroDivisionError("a bug")
+
+    for name in ("_quality",):
+        monkeypatch.setattr(Handlers, name, broken)
+    monkeypatch.setattr(desk.engine, "apply", broken)
+    monkeypatch.setattr(convert, "set_object", broken)
+    got = desk.ask(service)
+    assert got.status == INTERNAL_ERROR and "ZeroDivisionError: a bug" in got.message
+    assert len(desk.logged) == 1 and "Traceback" in desk.logged[0]
+    trigger = message("std_srvs/Trigger_Response")()
+    assert not desk.handlers.clear(None, trigger).success and "a bug" in trigger.message
+
+
+def test_half_filled_answers_are_thrown_away(desk, monkeypatch) -> None:
+    def broken(*_):
+        raise ZeroDivisionError("a bug at the end")
+
+    monkeypatch.setattr(convert, "set_cost", broken)
+    got = desk.ask("Distance", select=ALL)
+    assert got.status == INTERNAL_ERROR and is_empty(got)
+
+
+# ---------------------------------------------------------------------------------------------------- cross-check
+
+
+def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
+    desk = Desk()
+    taken = []
+    monkeypatch.setattr(desk.engine, "config", Config(cross_check_mode="all"))
+    monkeypatch.setattr(desk.engine.cross_check, "submit", lambda *arguments: taken.append(arguments))
+    turned = gs.SceneObject("turned", gs.Box([1, 1, 1]), (0, 5, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5)))
+    desk.engine.apply(gs.SceneUpdate(add=[turned]))
+    desk.ask("Distance", select=BY_IDS, ids_a=["turned", "ball"], ids_b=["ball", "cone"])
+    ((pairs, poses, answers, labels),) = taken
+    assert labels == ["turned ball"], "unsupported pairs are none of its business"
+    assert [type(shape) for shape in pairs[0]] == [gs.Box, gs.Sphere]
+    again = gs.distance(*pairs[0], poses)
+    assert np.allclose(again.distance, answers.distance) and np.allclose(again.point_a, answers.point_a)
+    assert np.allclose(again.point_b, answers.point_b) and np.allclose(again.normal, answers.normal)
