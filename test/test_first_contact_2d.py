@@ -160,7 +160,9 @@ CONSTRUCTED = {
     "parallel flight": (SQUARE, shifted(SQUARE, 3, 0), (0, 1), INF, "NEVER", None, None, None, []),
     "flies away": (SQUARE, shifted(SQUARE, 3, 0), (1, 0), INF, "NEVER", None, None, None, []),
     "at rest, apart": (SQUARE, shifted(SQUARE, 3, 0), (0, 0), INF, "NEVER", None, None, None, []),
-    "contact exactly at t_max": (SQUARE, shifted(SQUARE, 3, 0), (-1, 0), 2.0, "WILL_TOUCH", 2, 2, (1, 0), [(1, 0), (1, 1)]),
+    "contact exactly at t_max": (
+        SQUARE, shifted(SQUARE, 3, 0), (-1, 0), 2.0, "WILL_TOUCH", 2, 2, (1, 0), [(1, 0), (1, 1)],
+    ),
     "contact after t_max": (SQUARE, shifted(SQUARE, 3, 0), (-1, 0), 1.9375, "NEVER", None, None, None, []),
     "t_max of zero": (SQUARE, shifted(SQUARE, 1, 0), (-1, 0), 0.0, "TOUCHING", 0, 0, (1, 0), [(1, 0), (1, 1)]),
     "parts after t_max": (SQUARE, shifted(SQUARE, 3, 0), (-1, 0), 3.0, "WILL_TOUCH", 2, 3, (1, 0), [(1, 0), (1, 1)]),
@@ -168,7 +170,9 @@ CONSTRUCTED = {
     "point meets point": ([(0, 0)], [(3, 4)], (-1.5, -2), INF, "WILL_TOUCH", 2, 2, None, [(0, 0)]),
     "point misses point": ([(0, 0)], [(3, 4)], (-1.5, -2.0625), INF, "NEVER", None, None, None, []),
     "point on point": ([(1, 2)], [(1, 2)], (0, 0), INF, "TOUCHING", 0, INF, None, [(1, 2)]),
-    "point meets the end of a segment": ([(0, 0), (1, 0)], [(3, 0)], (-1, 0), INF, "WILL_TOUCH", 2, 3, (1, 0), [(1, 0)]),
+    "point meets the end of a segment": (
+        [(0, 0), (1, 0)], [(3, 0)], (-1, 0), INF, "WILL_TOUCH", 2, 3, (1, 0), [(1, 0)],
+    ),
     "point in a segment": ([(0, 0), (2, 0)], [(1, 0)], (1, 0), INF, "TOUCHING", 0, 1, None, [(1, 0)]),
     "point in a square": (SQUARE, [(0.5, 0.5)], (0, 1), INF, "TOUCHING", 0, 0.5, None, [(0.5, 0.5)]),
     "collinear segments meet": (
@@ -194,7 +198,8 @@ CONSTRUCTED = {
     ),
     "facing side of many collinear pieces": (
         [(1, y / 8) for y in range(9)] + [(0, 0.5)],
-        [(3, 1.5), (3, 1.25), (3, 0.75), (3, 0.5), (4, 1)], (-1, 0), INF, "WILL_TOUCH", 2, 3, (1, 0), [(1, 0.5), (1, 1)],
+        [(3, 1.5), (3, 1.25), (3, 0.75), (3, 0.5), (4, 1)], (-1, 0), INF, "WILL_TOUCH", 2, 3, (1, 0),
+        [(1, 0.5), (1, 1)],
     ),
 }  # fmt: skip
 
@@ -649,8 +654,7 @@ def test_broadcasting(batch):
     a, b, va, w = batch
     for one, many in ((a[:1], b), (a, b[:1])):
         answer = solve(one, many, va[0], w)
-        single = [solve(one if len(one) == 1 else one[i : i + 1], many if len(many) == 1 else many[i : i + 1], va[0], w[i])
-                  for i in range(0, 500, 50)]  # fmt: skip
+        single = [solve(one[i % len(one) :][:1], many[i % len(many) :][:1], va[0], w[i]) for i in range(0, 500, 50)]
         for k, other in zip(range(0, 500, 50), single, strict=True):
             assert answer.status[k] == other.status[0]
             np.testing.assert_array_equal(answer.time[k], other.time[0])

@@ -372,15 +372,23 @@ ExactVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {
     return {difference_of(to.x, from.x, before_, scale_), difference_of(to.y, from.y, before_, scale_)};
 }
 
+int PolygonPair::sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const {
+    const PairedPolygon& p = side(axis.side);
+    if (axis.index >= p.edges) {
+        return sign_of_dot({}, p.axis(axis.index), from, to);
+    }
+    return -sign_of_cross(p.ring[axis.index], p.ring[p.next(axis.index)], from, to);
+}
+
 std::size_t PolygonPair::lowest(AxisOf axis) const {
-    const Vec2 direction = side(axis.side).axis(axis.index);
     const PairedPolygon& q = other(axis.side);
-    std::size_t vertex = lowest_vertex(q, direction);
-    // Rounding of coordinates may have chosen a neighbour; edges know better.
-    for (std::size_t steps = 0; steps < q.edges && gain(direction, q, vertex) < 0.0; ++steps) {
+    std::size_t vertex = lowest_vertex(q, side(axis.side).axis(axis.index));
+    // Rounding of coordinates may have chosen a neighbour, or in a row of tiny edges one further off.
+    const auto is_lower = [&](std::size_t j) { return sign_of_height(axis, q.ring[vertex], q.ring[j]) < 0; };
+    for (std::size_t steps = 0; steps < q.edges && is_lower(q.next(vertex)); ++steps) {
         vertex = q.next(vertex);
     }
-    for (std::size_t steps = 0; steps < q.edges && gain(direction, q, q.previous(vertex)) > 0.0; ++steps) {
+    for (std::size_t steps = 0; steps < q.edges && is_lower(q.previous(vertex)); ++steps) {
         vertex = q.previous(vertex);
     }
     return vertex;
@@ -427,40 +435,14 @@ ExactVec2 PolygonPair::exact_axis(AxisOf axis) const {
     return {edge.y, -edge.x};
 }
 
-Enclosed PolygonPair::enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t lowest_vertex) const {
-    const PairedPolygon& q = other(axis.side);
-    const Vec2 base = side(axis.side).ring[side(axis.side).base(axis.index)];
-    const Chain chain = lowest(axis, lowest_vertex, {});
-    Enclosed least = enclosed_dot(direction, difference(q.ring[chain.first], base));
-    for (std::size_t j = chain.first; j != chain.last;) {
-        j = q.next(j);
-        const Enclosed gap = enclosed_dot(direction, difference(q.ring[j], base));
-        const double error = std::max(gap.error, least.error);
-        if (gap.value < least.value) {
-            least = gap;
-        }
-        least.error = error;
-    }
-    return least;
+Enclosed PolygonPair::enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const {
+    const PairedPolygon& p = side(axis.side);
+    return enclosed_dot(direction, difference(other(axis.side).ring[vertex], p.ring[p.base(axis.index)]));
 }
 
-int PolygonPair::sign_of_gap(AxisOf axis, std::size_t lowest_vertex) const {
+int PolygonPair::sign_of_gap(AxisOf axis, std::size_t vertex) const {
     const PairedPolygon& p = side(axis.side);
-    const PairedPolygon& q = other(axis.side);
-    const Vec2 base = p.ring[p.base(axis.index)];
-    const auto sign_at = [&](std::size_t j) {
-        if (axis.index >= p.edges) {
-            return sign_of_dot({}, p.axis(axis.index), base, q.ring[j]);
-        }
-        return -orientation(base, p.ring[p.next(axis.index)], q.ring[j]);
-    };
-    const Chain chain = lowest(axis, lowest_vertex, {});
-    int least = sign_at(chain.first);
-    for (std::size_t j = chain.first; j != chain.last;) {
-        j = q.next(j);
-        least = std::min(least, sign_at(j));
-    }
-    return least;
+    return sign_of_height(axis, p.ring[p.base(axis.index)], other(axis.side).ring[vertex]);
 }
 
 }  // namespace geomsrv

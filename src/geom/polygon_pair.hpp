@@ -157,11 +157,10 @@ public:
     /// The exact difference of two given points, times the scale.
     [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const;
 
-    /// The vertex of the other polygon that is lowest along an axis; one of them where several are level
-    /// within rounding.
+    /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
     [[nodiscard]] std::size_t lowest(AxisOf axis) const;
-    /// All that are as low as that one, up to `slack`.  Heights are summed over edges, which are relatively
-    /// exact, so that nearly parallel edges of polygons far apart are told from parallel ones.
+    /// All that are as low as that one, up to rounding and `slack`.  Heights are summed over edges, which are
+    /// relatively exact, so that nearly parallel edges of polygons far apart are told from parallel ones.
     [[nodiscard]] Chain lowest(AxisOf axis, std::size_t vertex, Slack slack) const;
     /// Vertices of the axis' own polygon that are highest along it, up to `slack`; among them the axis' edge.
     [[nodiscard]] Chain highest(AxisOf axis, Slack slack) const;
@@ -172,13 +171,14 @@ public:
 
     /// The axis itself: exact for edges, and for tips by definition.
     [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const;
-    /// Gap along an axis to twice the precision, and its exact sign; `vertex` is what `lowest` has found.
+    /// Gap along an axis to twice the precision, and its exact sign; `vertex` is the `lowest`.
     [[nodiscard]] Enclosed enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const;
     [[nodiscard]] int sign_of_gap(AxisOf axis, std::size_t vertex) const;
 
 private:
     bool place(Ring a, Ring b, bool known_strict);
     void project();
+    [[nodiscard]] int sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const;
 
     std::array<PairedPolygon, 2> sides_;
     std::vector<Vec2> around_;
