@@ -13,7 +13,7 @@ import numpy as np
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
-from geomsrv.world import ROUNDOFF, World
+from geomsrv.world import ROUNDOFF, UNDERFLOW, World
 
 __all__ = ["Aabbs", "Candidates", "Selection", "boxes_now", "boxes_swept", "candidates", "gaps"]
 
@@ -79,7 +79,7 @@ def boxes_now(world: World) -> Aabbs:
     half = np.einsum("nij,nj->ni", np.abs(turn), table.half[rows])
     half += (table.round[rows] + world.uncertainty)[:, None]
     reach = np.einsum("nij,nj->ni", np.abs(turn), np.abs(table.center[rows]))
-    half += AABB_ROUNDING * (np.abs(position) + reach + half)
+    half += AABB_ROUNDING * (np.abs(position) + reach + half) + UNDERFLOW
     center = position + offset
     lower, upper = center - half, center + half
     for i in np.flatnonzero(table.unbounded[rows]):
@@ -110,6 +110,8 @@ def _half_space_box(world: World, row: int) -> tuple[FloatArray, FloatArray]:
 def boxes_swept(world: World, horizon: float) -> Aabbs:
     """Boxes around all that every object passes through within the next `horizon` seconds."""
     now = boxes_now(world)
+    if horizon == 0.0:
+        return now
     lower, upper = now.lower, now.upper
     turning = np.flatnonzero(world.turns)
     if len(turning):
@@ -133,9 +135,8 @@ def boxes_swept(world: World, horizon: float) -> Aabbs:
             # -inf + inf: a half space that moves for ever; fmin and fmax keep the end that is known.
             lower[moving] = np.fmin(low, np.nextafter(low - slack + path, -np.inf))
             upper[moving] = np.fmax(high, np.nextafter(high + slack + path, np.inf))
-    if horizon > 0.0:
-        lost = list(world.motion_faults)
-        lower[lost], upper[lost] = -np.inf, np.inf
+    lost = list(world.motion_faults)
+    lower[lost], upper[lost] = -np.inf, np.inf
     return Aabbs(lower, upper)
 
 

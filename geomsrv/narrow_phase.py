@@ -39,10 +39,20 @@ __all__ = [
 # counts 22 u, r_b 22 + 50 + 16 = 88 u, |p_ab| 22 u + 6 u for its own arithmetic.
 RELATIVE_POSE_ROUNDING = 96.0 * ROUNDOFF
 
+# Shifting a ring: velocity difference 1 u, product 1 u, sum 1 u of numbers up to twice the larger coordinate, in
+# two coordinates.
+SHIFT_ROUNDING = 16.0 * ROUNDOFF
+
+# Speed along a normal, as a share of the velocity: its difference, two products and a sum take 4 u; a unit normal
+# is good to 4 u in each part; rounded up.
+SPEED_ROUNDING = 16.0 * ROUNDOFF
+
+# A length by a speed and a sum of times: 3 u, rounded up.
+TIME_ROUNDING = 8.0 * ROUNDOFF
+
 # Bodies that pass within their uncertainty are followed feature by feature; a polygon has few.  A pair still
 # open after so many steps is reported as one that may touch.
 MAX_APPROACH_STEPS = 64
-
 
 NO_DISTANCE = "distance {} is unsupported in this version"
 NO_ROTATION = "first contact of a polygon with angular velocity is unsupported"
@@ -245,7 +255,8 @@ def first_contact_rows(
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     planar = world.planar[pairs[:, 0]]
-    turning = world.turns[pairs].any(axis=1)
+    # Whatever turns, or moves in a way that nobody knows, is still where it is at the start.
+    turning = world.turns[pairs].any(axis=1) & (horizon > 0.0)
     sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar]
     if len(sliding) + len(spinning):
         count_kinds(world, pairs[planar], counts)
@@ -306,8 +317,7 @@ def _relative_velocity(world: World, pairs: IntArray) -> FloatArray:
 
 def _closing_speed(velocity: FloatArray, normal: FloatArray, sign: float) -> FloatArray:
     """Speed at which a comes nearer to b along the normal; moved up or down by more than its rounding."""
-    # Product, sum and subtraction of the velocities: 4 u; the normal itself is good to a few u.
-    slack = 16.0 * ROUNDOFF * np.abs(velocity).sum(axis=1)
+    slack = SPEED_ROUNDING * np.abs(velocity).sum(axis=1)
     closing: FloatArray = np.einsum("ki,ki->k", velocity, normal)
     return closing + sign * slack
 
@@ -316,7 +326,7 @@ def _earlier(time: FloatArray, by: FloatArray, velocity: FloatArray, normal: Flo
     """Earliest possible contact of bodies larger by `by` in all: they meet no sooner than their contact lines."""
     closing = _closing_speed(velocity, normal, -1.0)
     lead = np.divide(by, closing, out=np.full_like(by, np.inf), where=closing > 0.0)
-    return np.maximum(np.nextafter(time - lead, -np.inf), 0.0)
+    return np.maximum(np.nextafter(time - lead * (1.0 + TIME_ROUNDING), -np.inf), 0.0)
 
 
 def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> FloatArray:
@@ -338,7 +348,7 @@ def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> F
     depth = -_distance_at(world, rows.pairs, middle, True)[2]
     deep = depth >= by
     share = np.divide(by, depth, out=np.zeros_like(by), where=deep)
-    latest = rows.upper + share * (middle - rows.time) * (1.0 + 8.0 * ROUNDOFF)
+    latest = rows.upper + share * (middle - rows.time) * (1.0 + TIME_ROUNDING)
     latest = np.where(middle > rows.time, np.nextafter(latest, np.inf), rows.upper)
     return np.where(deep, latest, np.inf)
 
@@ -351,7 +361,9 @@ def _distance_at(
     ring_b, offsets_b = gather(*world.rings, pairs[:, 1])
     moved = ring_a + np.repeat(_relative_velocity(world, pairs) * time[:, None], np.diff(offsets_a), axis=0)
     answer = _core.distance_polygons(moved, offsets_a, ring_b, offsets_b, signed)
-    return answer[0], answer[1], answer[2], answer[5]
+    size = np.maximum.reduceat(np.maximum(np.abs(ring_a), np.abs(moved)).max(axis=1), offsets_a[:-1])
+    lower, upper = _widened(answer[1], answer[2], SHIFT_ROUNDING * size, signed)
+    return answer[0], lower, upper, answer[5]
 
 
 def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, counts: Counter[str]) -> FloatArray:
@@ -372,7 +384,7 @@ def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, cou
         closing = _closing_speed(_relative_velocity(world, here), normal, 1.0)
         step = np.divide(gap, closing, out=np.full_like(gap, np.inf), where=closing > 0.0)
         reached = gap <= 0.0
-        time[open_rows] += np.where(reached, 0.0, step)
+        time[open_rows] += np.where(reached, 0.0, step * (1.0 - TIME_ROUNDING))
         time[open_rows[time[open_rows] > horizon]] = np.nan
         open_rows = open_rows[~reached & np.isfinite(time[open_rows])]
     return np.where(np.isfinite(time), time, np.nan)
@@ -406,6 +418,7 @@ def _solid_contacts(
     motion = world.twists[rows.pairs]
     resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[rows.pairs].any(axis=1)
     resting &= ~world.velocity_uncertainty[rows.pairs].any(axis=1)
+    resting |= horizon == 0.0
     touching, may_touch = rows.distance <= 0.0, rows.lower <= 0.0
     status = np.select(
         [rows.distance < 0.0, touching, ~resting, rows.status == DistanceStatus.NOT_CONVERGED],

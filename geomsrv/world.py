@@ -32,11 +32,15 @@ from geomsrv.shapes import (
     pack,
 )
 
-__all__ = ["ROUNDOFF", "ShapeRow", "ShapeTable", "World", "gather", "supported_kinds"]
+__all__ = ["ROUNDOFF", "UNDERFLOW", "ShapeRow", "ShapeTable", "World", "gather", "supported_kinds"]
 
 AnyShape = Shape | Frustum
 
 ROUNDOFF = 2.0**-53  #: largest relative error of one float64 operation
+
+# A product below 2^-1022 is rounded to a multiple of 2^-1074, by half a unit; sums are exact down there.  The
+# few products that place an object lose less than this.
+UNDERFLOW = 2.0**-1070
 
 
 class ShapeRow(NamedTuple):

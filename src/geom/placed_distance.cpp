@@ -11,6 +11,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Products below 2^-1022 are rounded to multiples of 2^-1074, by half a unit each; a pose takes a dozen.
+constexpr double kUnderflow = 16 * std::numeric_limits<double>::denorm_min();
+
 bool unrotated(const double* pose) { return pose[3] == 0.0 && pose[4] == 0.0 && pose[5] == 0.0; }
 
 /// What rounding took from the difference a - b; exact (Knuth's two-sum).
@@ -55,7 +58,7 @@ Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double po
     double slack = a.uncertainty + b.uncertainty;
     if (!(unrotated(a.pose) && unrotated(b.pose))) {
         const Vec3 p = X_ab.translation;
-        slack += pose_rounding * arm(a, b, std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z));
+        slack += pose_rounding * arm(a, b, std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z)) + kUnderflow;
     }
     for (int k = 0; k < 3; ++k) {
         slack += lost(b.pose[k], a.pose[k]);
