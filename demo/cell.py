@@ -12,12 +12,12 @@ import geomsrv as gs
 from geomsrv.robot import Robot, example_robot_directory
 
 JOINTS = {
-    "panda_joint1": 0.25,
-    "panda_joint2": -0.35,
+    "panda_joint1": 0.1,
+    "panda_joint2": 0.1,
     "panda_joint3": 0.0,
-    "panda_joint4": -2.1,
+    "panda_joint4": -2.2,
     "panda_joint5": 0.0,
-    "panda_joint6": 1.75,
+    "panda_joint6": 2.2,
     "panda_joint7": 0.785,
     "panda_finger_joint1": 0.02,
 }
@@ -69,6 +69,9 @@ MOVERS = (
     Mover(3, "pallet", _rectangle(-1.4, -1.5, 0.45, 0.3, 0.6), (0.5, 0.55)),
     Mover(4, "person", _regular(-1.2, 1.5, 0.25, 12), (1.0, -0.1)),
 )
+
+#: What the movers are called here, by their id in the scene.
+NAMES = {mover.id: mover.name for mover in MOVERS}
 
 
 def robot() -> Robot:

@@ -46,9 +46,7 @@ class Picture:
     frustum: gs.Frustum
     nearest: tuple[np.ndarray, np.ndarray, str] | None = None  #: the two points and a label
     touching: Sequence[np.ndarray] = ()  #: contact points in 3D
-    footprints: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(
-        default_factory=dict
-    )  #: id -> ring, velocity
+    footprints: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)  #: id -> ring, velocity
     planned: Sequence[PlannedContact] = ()
 
 
@@ -72,6 +70,8 @@ def _placed(item: gs.SceneObject, points: np.ndarray) -> np.ndarray:
 
 
 def _draw_cell(axes: plt.Axes, picture: Picture) -> None:
+    # Drawn back to front by hand: furniture, then what stands on it, then lines; matplotlib sorts whole objects badly.
+    axes.computed_zorder = False
     for item in picture.objects:
         mesh = _mesh(item.shape)
         if mesh is None:
@@ -79,35 +79,36 @@ def _draw_cell(axes: plt.Axes, picture: Picture) -> None:
         state = picture.states.get(item.id)
         color = {gs.INSIDE: INSIDE, gs.INTERSECTS: PARTLY, gs.OUTSIDE: UNSEEN, None: UNSEEN}[state]
         triangles = _placed(item, mesh.vertices)[mesh.faces]
+        furniture = "table" in item.id
         axes.add_collection3d(
-            Poly3DCollection(triangles, facecolor=color, edgecolor="none", alpha=0.45 if "table" in item.id else 0.9,
-                             shade=True)
-        )  # fmt: skip
+            Poly3DCollection(triangles, facecolors=color, alpha=0.7 if furniture else 0.95, shade=True),
+            zs=0,
+        )
+        axes.collections[-1].set_zorder(1 if furniture else 2 - 0.1 * np.mean(triangles[..., 1]))
     corners = picture.frustum.corners()
     edges = [(0, 1), (1, 3), (3, 2), (2, 0)]
     lines = [(corners[i + k], corners[j + k]) for i, j in edges for k in (0, 4)]
-    lines += [(picture.frustum.origin, corners[i]) for i in range(4)] + [
-        (corners[i], corners[i + 4]) for i in range(4)
-    ]
-    axes.add_collection3d(Line3DCollection(lines, colors=VIEW, linewidths=0.8))
+    lines += [(picture.frustum.origin, corners[i]) for i in range(4)]
+    lines += [(corners[i], corners[i + 4]) for i in range(4)]
+    axes.add_collection3d(Line3DCollection(lines, colors=VIEW, linewidths=0.8, zorder=4))
+    axes.scatter(*picture.frustum.origin, color=VIEW, marker="s", s=25, zorder=4)
+    nearest = "nearest pair"
     if picture.nearest is not None:
         a, b, label = picture.nearest
-        axes.plot(*np.array([a, b]).T, color=NEAREST, linewidth=2.5, marker="o", markersize=4, zorder=20)
-        axes.text(*(a + b) / 2 + [0.0, 0.0, 0.08], label, fontsize=8, zorder=21)
+        axes.plot(*np.array([a, b]).T, color=NEAREST, linewidth=2.5, marker="o", markersize=4, zorder=6)
+        nearest = f"nearest: {label}"
     for point in picture.touching:
-        axes.scatter(*point, color=CONTACT, s=30, depthshade=False, zorder=22)
-    axes.set(
-        xlim=(-0.6, 1.0), ylim=(-0.8, 0.8), zlim=(-0.3, 1.3), xlabel="x [m]", ylabel="y [m]", zlabel="z [m]"
-    )
-    axes.set_box_aspect((1, 1, 1))
-    axes.view_init(elev=24, azim=-58)
+        axes.scatter(*point, color=CONTACT, s=30, depthshade=False, zorder=7)
+    axes.set(xlim=(-0.5, 1.8), ylim=(-1.0, 1.0), zlim=(-0.75, 1.1), xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    axes.set_box_aspect((2.3, 2.0, 1.85), zoom=1.15)
+    axes.view_init(elev=22, azim=-112)
     axes.legend(
         handles=[
             Patch(color=INSIDE, label="inside the view"),
             Patch(color=PARTLY, label="partly in view"),
-            Patch(color=UNSEEN, label="outside, or not judged"),
-            Line2D([], [], color=VIEW, label="camera frustum"),
-            Line2D([], [], color=NEAREST, marker="o", markersize=4, label="nearest pair"),
+            Patch(color=UNSEEN, label="outside"),
+            Line2D([], [], color=VIEW, marker="s", markersize=4, label="camera and its frustum"),
+            Line2D([], [], color=NEAREST, marker="o", markersize=4, label=nearest),
             Line2D([], [], color=CONTACT, marker="o", linestyle="", label="contact now"),
         ],
         loc="upper left",
@@ -117,14 +118,12 @@ def _draw_cell(axes: plt.Axes, picture: Picture) -> None:
 
 
 def _draw_plan(axes: plt.Axes, picture: Picture) -> None:
-    last = max((contact.time for contact in picture.planned), default=0.0)
     for (name, (ring, velocity)), color in zip(picture.footprints.items(), BODIES, strict=False):
         axes.add_patch(Polygon(ring, closed=True, facecolor=color, alpha=0.55, edgecolor=color))
         center = ring.mean(axis=0)
         axes.annotate(name, center, ha="center", va="center", fontsize=7, zorder=5)
         if np.any(velocity):
-            times = [c.time for c in picture.planned if name in (c.id_a, c.id_b)] or [last]
-            for time in times:
+            for time in [c.time for c in picture.planned if name in (c.id_a, c.id_b)]:
                 axes.add_patch(
                     Polygon(ring + velocity * time, closed=True, fill=False, linestyle="--", edgecolor=color)
                 )

@@ -48,12 +48,8 @@ ANSWER_DEADLINE_S = 20.0
 HORIZON_S = 5.0
 MAX_DISTANCE_M = 0.5
 TIMED_CALLS = 50
-LATCHED = QoSProfile(
-    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
-STATE = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+LATCHED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -120,14 +116,14 @@ class Client:
             return self.latest[topic]
 
     def call(self, name: str, request: Any) -> Any:
-        """The response of a service; a refusal is a failure of the demo."""
+        """The response of a service; a refusal is a failure of the demo, an item without a kernel is not."""
         future = self._services[name].call_async(request)
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
         if not done.wait(ANSWER_DEADLINE_S):
             raise DemoFailure(f"service ~/{name} did not answer within {ANSWER_DEADLINE_S:g} s")
         response = future.result()
-        if getattr(response, "status", 0) != 0:
+        if getattr(response, "status", 0) not in (gv.Cull.Response.OK, gv.Cull.Response.UNSUPPORTED):
             raise DemoFailure(f"service ~/{name} refused: {response.message}")
         return response
 
@@ -248,8 +244,8 @@ def show_visible(console: Console, response: Any) -> None:
     table.add_column("state")
     table.add_column("objects")
     for state in (gs.INSIDE, gs.INTERSECTS):
-        names = [name for name, s in zip(response.ids, response.states, strict=True) if s == state]
-        table.add_row(state.name, ", ".join(names) or "-")
+        seen = [cell.NAMES.get(i, i) for i, s in zip(response.ids, response.states, strict=True) if s == state]
+        table.add_row(state.name, ", ".join(seen) or "-")
     unseen = sum(s == gs.OUTSIDE for s in response.states)
     table.add_row(gs.OUTSIDE.name, f"{unseen} of {len(response.ids)}")
     console.print(table)
@@ -257,8 +253,9 @@ def show_visible(console: Console, response: Any) -> None:
 
 def show_distances(console: Console, response: Any, ours: set[str]) -> int:
     """Contacts now and the robot's clearances; returns the row of the robot's nearest pair."""
+    names = cell.NAMES
     table = Table(title="Distance", title_justify="left")
-    for heading in ("pair", "distance [mm]", "proven interval [mm]"):
+    for heading in ("pair", "distance [mm]", "proven to within [mm]"):
         table.add_column(heading, justify="left" if heading == "pair" else "right")
     order = np.argsort(np.asarray(response.distance), kind="stable").tolist()
     robot_rows = [i for i in order if len({response.ids_a[i], response.ids_b[i]} & ours) == 1]
@@ -266,10 +263,10 @@ def show_distances(console: Console, response: Any, ours: set[str]) -> int:
         raise DemoFailure(f"no object within {MAX_DISTANCE_M:g} m of the robot")
     touching = [i for i in order if response.distance[i] <= 0.0]
     for i in [*touching, *robot_rows[:4]]:
-        low, high = 1e3 * response.lower[i], 1e3 * response.upper[i]
-        bounds = f"[{low:.9f}, {high:.9f}]" if low else f"[0, {high:.3g}]"
         table.add_row(
-            f"{response.ids_a[i]} - {response.ids_b[i]}", f"{1e3 * response.distance[i]:.6f}", bounds
+            f"{names.get(response.ids_a[i], response.ids_a[i])} - {names.get(response.ids_b[i], response.ids_b[i])}",
+            f"{1e3 * response.distance[i]:.6f}",
+            f"{1e3 * (response.upper[i] - response.lower[i]):.1e}",
         )
     console.print(table)
     return int(robot_rows[0])
@@ -277,7 +274,7 @@ def show_distances(console: Console, response: Any, ours: set[str]) -> int:
 
 def show_contacts(console: Console, response: Any) -> list[picture.PlannedContact]:
     """Who touches whom when and where, in the plane; returns what will be drawn."""
-    names = {mover.id: mover.name for mover in cell.MOVERS}
+    names = cell.NAMES
     table = Table(title=f"First contact within {HORIZON_S:g} s", title_justify="left")
     for heading in ("pair", "outcome", "time [s]", "proven width [s]", "contact set [m]"):
         table.add_column(heading)
@@ -298,28 +295,20 @@ def show_contacts(console: Console, response: Any) -> list[picture.PlannedContac
             )
         if status == gs.WILL_TOUCH and {a, b} <= names.keys():
             normal = np.asarray(response.normal[3 * i : 3 * i + 2])
-            planned.append(
-                picture.PlannedContact(names[a], names[b], response.time[i], points[:, :2], normal)
-            )
+            planned.append(picture.PlannedContact(names[a], names[b], response.time[i], points[:, :2], normal))
     console.print(table)
-    unsupported = sum(s == gs.ContactStatus.UNSUPPORTED for s in response.item_status)
-    if unsupported:
-        console.print(
-            f"{unsupported} pairs of moving solids: unsupported in this version, by name in the answer\n"
-        )
+    if response.message:
+        console.print(f"Named by the node: {response.message}\n")
     return planned
 
 
 def show_cross_check(console: Console, state: Any) -> None:
     """The tally of FCL beside the engine."""
-    table = Table(title=f"Cross-check against FCL: {state.cross_check_status or state.cross_check_mode}")
-    table.title_justify = "left"
+    table = Table(title=f"Cross-check against FCL, mode {state.cross_check_mode}", title_justify="left")
     columns = ("kind", "agreed", "explained", "unexplained", "skipped")
     for heading in columns:
         table.add_column(heading, justify="left" if heading == "kind" else "right")
-    for row in zip(
-        *(getattr(state, f"cross_check_{'kinds' if c == 'kind' else c}") for c in columns), strict=True
-    ):
+    for row in zip(*(getattr(state, f"cross_check_{'kinds' if c == 'kind' else c}") for c in columns), strict=True):
         table.add_row(*map(str, row))
     console.print(table)
 
@@ -334,8 +323,8 @@ def run(console: Console, path: Path) -> None:
     allowed = cell.allowed_pairs(panda)
     vertices = sum(len(o.shape.vertices) for o in links if isinstance(o.shape, gs.Convex))
     console.print(
-        f"Panda: {len(links)} collision geometries, {vertices} hull vertices, {len(panda.allowed_pairs)} allowed pairs, "
-        f"and {len(furniture)} other objects\n"
+        f"Panda: {len(links)} collision geometries, {vertices} hull vertices, {len(panda.allowed_pairs)} allowed pairs"
+        f" and {len(furniture)} other objects\n"
     )
     client = Client()
     stream = None
@@ -394,7 +383,7 @@ def run(console: Console, path: Path) -> None:
         judge(seen, near, planned, tally)
         points = np.reshape(near.point_a, (-1, 3)), np.reshape(near.point_b, (-1, 3))
         now = {item.id: item for item in convert.update_from(scene.scene).add}
-        label = f"{near.ids_a[nearest]} - {near.ids_b[nearest]}\n{1e3 * near.distance[nearest]:.1f} mm"
+        label = f"{near.ids_a[nearest]} - {near.ids_b[nearest]}, {1e3 * near.distance[nearest]:.1f} mm"
         picture.draw(
             picture.Picture(
                 objects=[item for item in now.values() if not isinstance(item.shape, gs.Polygon)],
@@ -426,9 +415,7 @@ def judge(seen: Any, near: Any, planned: Sequence[picture.PlannedContact], tally
     if state.get("carton") == gs.OUTSIDE or gs.OUTSIDE not in state.values():
         raise DemoFailure("the camera must see the carton, and not everything")
     touching = {
-        frozenset(p)
-        for p, d in zip(zip(near.ids_a, near.ids_b, strict=True), near.distance, strict=True)
-        if d <= 0
+        frozenset(p) for p, d in zip(zip(near.ids_a, near.ids_b, strict=True), near.distance, strict=True) if d <= 0
     }
     expected = {frozenset((thing, "table")) for thing in ("carton", "ball", "bottle")}
     if touching != expected:
@@ -436,27 +423,16 @@ def judge(seen: Any, near: Any, planned: Sequence[picture.PlannedContact], tally
             f"what stands on the table must touch it, and nothing else; got {sorted(map(sorted, touching))}"
         )
     meetings = {frozenset((contact.id_a, contact.id_b)): len(contact.points) for contact in planned}
-    if (
-        meetings.get(frozenset(("cart", "footprint"))) != 2
-        or meetings.get(frozenset(("pallet", "footprint"))) != 1
-    ):
-        raise DemoFailure(
-            f"the cart must meet the footprint along an edge, the pallet in a point; got {meetings}"
-        )
+    if meetings.get(frozenset(("cart", "footprint"))) != 2 or meetings.get(frozenset(("pallet", "footprint"))) != 1:
+        raise DemoFailure(f"the cart must meet the footprint along an edge, the pallet in a point; got {meetings}")
     if tally.cross_check_mode != "off" and sum(tally.cross_check_unexplained):
-        raise DemoFailure(
-            f"the cross-check found {sum(tally.cross_check_unexplained)} unexplained differences"
-        )
+        raise DemoFailure(f"the cross-check found {sum(tally.cross_check_unexplained)} unexplained differences")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Start the node, run the demo, stop the node."""
-    parser = argparse.ArgumentParser(
-        prog="geomsrv demo", description="A Panda on a table, a node and a client."
-    )
-    parser.add_argument(
-        "--picture", type=Path, default=Path("demo_output/robot_cell.png"), help="where to write it"
-    )
+    parser = argparse.ArgumentParser(prog="geomsrv demo", description="A Panda on a table, a node and a client.")
+    parser.add_argument("--picture", type=Path, default=Path("demo_output/robot_cell.png"), help="where to write it")
     arguments = parser.parse_args(argv)
     console = Console(width=120)
     node = start_node()
