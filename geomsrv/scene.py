@@ -13,7 +13,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -371,10 +371,12 @@ class Scene:
         SceneError
             ``errors`` names every bad object; the scene is as it was.
         """
+        if not isinstance(update, SceneUpdate):
+            raise GeometryError(f"update must be SceneUpdate, got {type(update).__name__}")
         faults: Faults = {}
         with self._lock:
             left = {} if update.clear else dict(self._objects)
-            for name in update.remove:
+            for name in _names(update.remove, "remove"):
                 if left.pop(name, None) is None:
                     _blame(faults, name, "cannot be removed: no such object")
             added = self._checked(update.add, faults)
@@ -681,13 +683,8 @@ class Scene:
         for k, text in sorted(found.items()):
             _blame(faults, items[k].id, text)
         return {
-            item.id: replace(
-                item,
-                pose=poses[k],
-                twist=twists[k],
-                frame="",
-                uncertainty=float(radii[k, 0]),
-                velocity_uncertainty=float(radii[k, 1]),
+            item.id: SceneObject(
+                item.id, item.shape, poses[k], twists[k], "", float(radii[k, 0]), float(radii[k, 1]), item.motion_fault
             )
             for k, item in enumerate(items)
         }
@@ -697,7 +694,7 @@ class Scene:
         known, index, rows = self._resolved
         if index is world.index and (ids is known or list(ids) == known):
             return rows
-        names = list(ids)
+        names = _names(ids, "ids")
         faults: Faults = {}
         for name, times in Counter(names).items():
             if name not in world.index:
@@ -741,6 +738,17 @@ def _blame(faults: Faults, name: object, text: str) -> None:
     faults[key] = f"{faults[key]}; {text}" if key in faults else text
 
 
+def _names(ids: Iterable[str], argument: str) -> list[str]:
+    """A list of ids, whether or not there are such objects."""
+    if isinstance(ids, str):
+        raise GeometryError(f"{argument} must list ids, got the string {ids!r}")
+    names: list[Any] = list(ids)
+    for k, name in enumerate(names):
+        if not isinstance(name, str):
+            raise GeometryError(f"{argument}[{k}] must be an id, got {name!r}")
+    return names
+
+
 def _pairs(pairs: Iterable[Pair], argument: str, faults: Faults) -> list[Pair]:
     """Pairs of ids, smaller id first."""
     out = []
@@ -772,12 +780,10 @@ def _limit(value: float, name: str) -> float:
 
 def _members(world: World, ids: Iterable[str], name: str) -> BoolArray:
     """(n,) bool: the objects listed."""
-    if isinstance(ids, str):
-        raise GeometryError(f"{name} must list ids, got the string {ids!r}")
-    listed = list(ids)
+    listed = _names(ids, name)
     unknown = [name for name in listed if name not in world.index]
     if unknown:
-        raise SceneError({str(name): "no such object" for name in unknown})
+        raise SceneError(dict.fromkeys(unknown, "no such object"))
     mask = np.zeros(len(world), dtype=bool)
     mask[[world.index[name] for name in listed]] = True
     return mask

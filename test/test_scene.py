@@ -945,6 +945,15 @@ def test_bad_arguments_are_named():
         scene.cull("camera")
     with pytest.raises(gs.SceneError, match="itself"):
         gs.Scene(allowed_pairs=[("a", "a")])
+    with pytest.raises(gs.GeometryError, match="update must be SceneUpdate, got list"):
+        scene.apply([gs.SceneObject("a", gs.Sphere(1.0))])
+    for wrong, text in (("solid 0000", "got the string"), ([["solid 0000"]], r"\[0\] must be an id")):
+        with pytest.raises(gs.GeometryError, match=f"ids.*{text}"):
+            scene.set_states(wrong, [IDENTITY])
+        with pytest.raises(gs.GeometryError, match=f"ids.*{text}"):
+            scene.cull(CAMERA, ids=wrong)
+        with pytest.raises(gs.GeometryError, match=f"remove.*{text}"):
+            scene.apply(gs.SceneUpdate(remove=wrong))
 
 
 def test_answers_are_about_one_version_while_states_change():
