@@ -193,6 +193,12 @@ def hull(rng: np.random.Generator, kind: str) -> np.ndarray:
     return points @ rotation(random_turn(rng)).T if rng.random() < 0.5 else points
 
 
+def ordinary_hull(rng: np.random.Generator) -> np.ndarray:
+    """(12, 3) points on a sphere of radius 1: a hull in general position whose every point is a vertex."""
+    points = rng.normal(size=(12, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
 def hull_pair(rng: np.random.Generator, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Two hulls, the second now and then the first again or its mirror image, in a position where they nearly touch."""
     a, b = hull(rng, kind), hull(rng, HULLS[rng.integers(len(HULLS))])

@@ -34,8 +34,8 @@ CoreSeparation capsule_capsule(const Placed& a, const Placed& b, bool) {
 CoreSeparation general(const Placed& a, const Placed& b, bool deep) {
     return convex_convex(a.core, b.core, deep);
 }
-CoreSeparation convex_half(const Placed& a, const Placed& b, bool) {
-    return convex_half_space(a.core, b.half_space);
+CoreSeparation convex_half(const Placed& a, const Placed& b, bool deep) {
+    return convex_half_space(a.core, b.half_space, deep);
 }
 CoreSeparation half_half(const Placed& a, const Placed& b, bool) {
     return half_space_half_space(a.half_space, b.half_space);

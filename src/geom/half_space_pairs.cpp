@@ -36,7 +36,7 @@ Vec3 common_point(const PlacedHalfSpace& a, const PlacedHalfSpace& b) {
 
 }  // namespace
 
-CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b) {
+CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool penetration) {
     const double length = norm(b.normal);
     const Vec3 up = {b.normal.x / length, b.normal.y / length, b.normal.z / length};
     const Extreme bottom = lowest(a, up);
@@ -50,7 +50,7 @@ CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b) {
     out.lower = value - error;
     out.upper = value + error;
     out.point_a = vertex_of(a, bottom.vertex);
-    out.point_b = out.point_a - value * up;
+    out.point_b = value <= 0.0 && !penetration ? out.point_a : out.point_a - value * up;
     out.normal = -up;
     out.converged = true;
     out.stage = Stage::closed_form;

@@ -16,8 +16,9 @@ struct PlacedHalfSpace {
     double offset_error = 0.0;
 };
 
-/// Exact but for rounding: the depth of a convex body in a half space is that of its lowest point.
-CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b);
+/// Exact but for rounding: the depth of a convex body in a half space is that of its lowest point.  Without
+/// `penetration` that is a common point if it lies in the half space.
+CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool penetration);
 
 /// Half spaces that face each other: the gap between their planes, or minus the thickness of what they share.
 /// All others share an unbounded part and cannot be parted: distance -infinity, no normal.
