@@ -6,17 +6,15 @@
 #include <cmath>
 #include <limits>
 
+#include "geom/rounding.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
 
-/// Half the distance from 1 to the next double: the largest relative error of one rounding.
-inline constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2.0;
-
-// Cross product of two rounded differences: each difference carries a relative error of kRoundoff, each
+// Cross product of two rounded differences: each difference carries a relative error of kUnitRoundoff, each
 // product one more and their difference one more, (1 + r)^4 - 1 < 4.5 r of |ux vy| + |uy vx|.  The last half
 // covers the rounding of the bound itself.
-inline constexpr double kCrossError = 5.0 * kRoundoff;
+inline constexpr double kCrossError = 5.0 * kUnitRoundoff;
 
 // A product below 2^-1022 is rounded to a multiple of 2^-1074 instead: half a unit in each of the two
 // products and in each of the two terms of the bound.

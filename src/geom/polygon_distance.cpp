@@ -34,8 +34,8 @@ constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Relative error of gap/|D| once the gap is known to its gap_error: squares and their sum 3 units of
-// kRoundoff, halved by the root, root, quotient; the rest covers the bound.
-constexpr double kWidthError = 5.0 * kRoundoff;
+// kUnitRoundoff, halved by the root, root, quotient; the rest covers the bound.
+constexpr double kWidthError = 5.0 * kUnitRoundoff;
 
 // Lengths below are not resolved by their squares; an axis so short is taken to be this long.
 constexpr double kShortestAxis = 0x1p-500;

@@ -41,10 +41,10 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Rounding of the input, as a multiple of half an ulp of the largest coordinate: rotating and shifting a
 // polygon moves a vertex by less than 7 (see kRingTolerance in polygon.hpp), rounded up.
-constexpr double kInputNoise = 8.0 * kRoundoff;
+constexpr double kInputNoise = 8.0 * kUnitRoundoff;
 
 // Likewise for velocities, which are only rotated: 3.42 * 1.42 < 5 half ulps of the larger component.
-constexpr double kVelocityNoise = 5.0 * kRoundoff;
+constexpr double kVelocityNoise = 5.0 * kUnitRoundoff;
 
 // No slack exceeds this part of the reach (or of the speed).  So separations, angles and overlaps that are
 // larger are always told apart, however far from the origin and however short the edges: with tips a gap is
@@ -57,7 +57,7 @@ constexpr double kSmallestSpeed = 0x1p-200;
 constexpr double kLargestSpeed = 0x1p200;
 
 // Error of a rate D.w relative to |Dx wx| + |Dy wy|: edge, velocity, product, sum; the rest covers the bound.
-constexpr double kRateError = 5.0 * kRoundoff;
+constexpr double kRateError = 5.0 * kUnitRoundoff;
 
 /// Motion of b relative to a, in units of its own.
 struct Motion {
@@ -286,15 +286,17 @@ Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
     return result;
 }
 
+// A gap and a rate known to this relative error make a time that is good enough as it is, 2^-45: about 50
+// times what rounding leaves of numbers in which nothing cancels.
+constexpr double kSharp = 0x1p-46;
+
 /// The numbers of one axis taken literally, without slack for rounding of the input.
 struct LiteralAxis {
     double gap, rate, gap_error, rate_error;
 
-    /// Both known to about 45 bits, so that their quotient is good enough as it is.
     [[nodiscard]] bool is_sharp() const {
         return gap_error < kSharp * std::fabs(gap) && rate_error < kSharp * std::fabs(rate);
     }
-    static constexpr double kSharp = 0x1p-46;
 };
 
 LiteralAxis literal(const PolygonPair& pair, AxisOf axis, const Motion& motion, const Slacks& slacks) {

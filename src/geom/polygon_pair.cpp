@@ -22,7 +22,7 @@ constexpr double kLargestReach = 0x1p200;
 constexpr std::size_t kLargestProduct = 1024;
 
 // Gain of height along an edge that is certainly not rounding: two relatively exact edges, products, sum.
-constexpr double kHeightError = 6.0 * kRoundoff;
+constexpr double kHeightError = 6.0 * kUnitRoundoff;
 
 constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -50,13 +50,13 @@ struct Placed {
 };
 
 /// How given coordinates become local ones.  Plain ones take no factors, which costs half the time.
-template <bool kScaled>
+template <bool Scaled>
 struct Units {
     double before = 1.0;
     double scale = 1.0;
 
     [[nodiscard]] GEOMSRV_INLINE Lanes difference(const Lanes& to, const Lanes& from) const {
-        if constexpr (kScaled) {
+        if constexpr (Scaled) {
             return Lanes(scale) * (Lanes(before) * to - Lanes(before) * from);
         }
         return to - from;
@@ -65,8 +65,8 @@ struct Units {
 
 /// Local vertices and outward normals of a ring.  One pass without branches: loops over so few vertices cost
 /// as much by their unpredictable ends as by their work.
-template <bool kScaled>
-GEOMSRV_INLINE Placed place_ring(const PairedPolygon& p, Vec2 origin, Units<kScaled> units) {
+template <bool Scaled>
+GEOMSRV_INLINE Placed place_ring(const PairedPolygon& p, Vec2 origin, Units<Scaled> units) {
     const std::size_t n = p.ring.size();
     Lanes reach = 0.0;
     LaneMask strict = Lanes(0.0) <= Lanes(0.0);
@@ -156,12 +156,12 @@ bool append_tips(PairedPolygon& p) {
 }
 
 /// Blocks of axes of p projected on all vertices of q; several blocks share the loads of the vertices.
-template <std::size_t kBlocks>
+template <std::size_t Blocks>
 GEOMSRV_INLINE void project_blocks(const PairedPolygon& p, const PairedPolygon& q, std::size_t first) {
-    std::array<Lanes, kBlocks> dx;
-    std::array<Lanes, kBlocks> dy;
-    std::array<Lanes, kBlocks> low;
-    for (std::size_t i = 0; i < kBlocks; ++i) {
+    std::array<Lanes, Blocks> dx;
+    std::array<Lanes, Blocks> dy;
+    std::array<Lanes, Blocks> low;
+    for (std::size_t i = 0; i < Blocks; ++i) {
         dx[i] = Lanes::load(p.dx + first + i * kLanes);
         dy[i] = Lanes::load(p.dy + first + i * kLanes);
         low[i] = kInfinity;
@@ -169,11 +169,11 @@ GEOMSRV_INLINE void project_blocks(const PairedPolygon& p, const PairedPolygon& 
     for (std::size_t j = 0; j < q.ring.size(); ++j) {
         const Lanes x = q.x[j];
         const Lanes y = q.y[j];
-        for (std::size_t i = 0; i < kBlocks; ++i) {
+        for (std::size_t i = 0; i < Blocks; ++i) {
             low[i] = lesser(dx[i] * x + dy[i] * y, low[i]);
         }
     }
-    for (std::size_t i = 0; i < kBlocks; ++i) {
+    for (std::size_t i = 0; i < Blocks; ++i) {
         const std::size_t k = first + i * kLanes;
         (low[i] - (dx[i] * Lanes::load(p.x + k) + dy[i] * Lanes::load(p.y + k))).store(p.gap + k);
     }
@@ -365,7 +365,7 @@ void PolygonPair::project() {
     for (const PairedPolygon& p : sides_) {
         std::fill_n(p.gap + p.axes, kLanes - 1, -1.0);
     }
-    gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kRoundoff * reach_;
+    gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kUnitRoundoff * reach_;
 }
 
 ExactVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {

@@ -34,7 +34,7 @@
 
 namespace geomsrv {
 
-/// Error of a gap, relative to |D|_1 times the reach of the pair, in units of kRoundoff: edge, local
+/// Error of a gap, relative to |D|_1 times the reach of the pair, in units of kUnitRoundoff: edge, local
 /// coordinate, product and sum make 4 for each of the two projections, their difference 2 (it is at most 2
 /// |D|_1 reach); the rest covers second-order terms and the rounding of the bound.
 inline constexpr double kGapError = 12.0;
