@@ -16,6 +16,7 @@ os.environ.pop("ROS_LOCALHOST_ONLY", None)
 
 import numpy as np  # noqa: E402
 import rclpy  # noqa: E402
+from rclpy._rclpy_pybind11 import NodeNameNonExistentError  # noqa: E402
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
@@ -76,9 +77,9 @@ class NodeUnderTest:
     def stop(self) -> None:
         """Destroy the node as main() does; fails if a callback had raised."""
         self._executor.shutdown()
-        rclpy.shutdown(context=self.context)
         self._thread.join(DEADLINE)
         self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
         assert not self._thread.is_alive()
         assert not self.errors, self.errors
 
@@ -147,6 +148,13 @@ class Client:
         future = self.service(kind, name).call_async(kind.Request(**fields) if request is None else request)
         self.until(future.done, f"answer of {name}", seconds)
         return future.result()
+
+    def services_of(self, node: str) -> dict[str, list[str]]:
+        """Names and types of a node's services; empty as long as the node is unknown."""
+        try:
+            return dict(self.node.get_service_names_and_types_by_node(node, "/"))
+        except NodeNameNonExistentError:
+            return {}
 
     def listen(self, kind: Any, topic: str, qos: QoSProfile | int = 10) -> Inbox:
         """An inbox for a topic that is connected to the node."""

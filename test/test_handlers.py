@@ -209,7 +209,7 @@ def test_first_contact_of_all_pairs(desk) -> None:
     desk.engine.apply(gs.SceneUpdate(add=[obj("cone", gs.Cone(0.5, 1.0), (0, 0, 1))]))
     got = desk.ask("FirstContact", select=ALL, horizon=5.0)
     assert got.status == UNSUPPORTED and "cone" in got.message and 4 in got.item_status
-    desk.engine.apply(gs.SceneUpdate(remove=["cone"], add=[obj("deep", gs.Box([1, 1, 1]), (0.5, 0, 0))]))
+    desk.engine.apply(gs.SceneUpdate(remove=["cone"], add=[obj("deep", gs.Box([1, 1, 1]), (-0.5, 0, 0))]))
     now = desk.ask("FirstContact", select=ALL, horizon=5.0)
     assert now.status == OK and now.time.tolist() == sorted(now.time)
     assert ("box", "deep") == (now.ids_a[0], now.ids_b[0]) and now.item_status[0] == 3 and now.time[0] == 0.0

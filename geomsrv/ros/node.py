@@ -11,7 +11,9 @@ from __future__ import annotations
 import functools
 import importlib.util
 import math
+import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
@@ -29,6 +31,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -92,8 +95,11 @@ SERVICES = {
 }
 
 REPORT_PERIOD = 1.0  # [s], of ~/state and /diagnostics
-RECHECK_PERIOD = 0.1  # [s], until an endpoint known to be incompatible shows up in the node's graph
-MAX_RECHECKS = 20
+
+# An endpoint is discovered before the name of its node.  It is looked at again until the name is known or this many
+# periods have passed; together they stay below the second within which a mismatch is to be reported.
+RECHECK_PERIOD = 0.1  # [s]
+MAX_RECHECKS = 8
 
 # Drawing takes at most this share of the node's time, evaluating at most that one; the rest is for inputs and services.
 MARKER_SHARE = 0.1
@@ -291,6 +297,9 @@ class GeomsrvNode(LifecycleNode):
         if self._engine is not None:
             self._engine.close()
         super().destroy_node()
+        # rclpy forgets the lifecycle's state machine, whose services would keep the node in the graph.
+        for name in [name for name in vars(self) if name == "_state_machine" or name.startswith("_service_")]:
+            delattr(self, name)
 
     # ---------------------------------------------------------------------------------------------------- services
 
@@ -412,7 +421,7 @@ class GeomsrvNode(LifecycleNode):
 
     @_guarded
     def _incompatible(self, _: Any) -> None:
-        """An endpoint does not get through to us.  Its node may not be in the graph yet, so look for it a few times."""
+        """An endpoint does not get through to us; who it is may take a moment to be known."""
         self._rechecks = MAX_RECHECKS
         self._recheck_timer.reset()
         self._recheck()
@@ -421,22 +430,22 @@ class GeomsrvNode(LifecycleNode):
     def _recheck(self) -> None:
         self._rechecks -= 1
         if self._find_mismatches():
-            self._rechecks = 0
             self._report()
         if self._rechecks <= 0:
             self._recheck_timer.cancel()
 
     def _find_mismatches(self) -> bool:
         """Compare the profiles of all endpoints on our topics with ours; log what is new; True if anything is."""
-        found = []
+        found: list[str] = []
+        settled = self._rechecks <= 0
         for topic, subscription in zip(INPUTS, self._subscriptions_made, strict=True):
             name = subscription.topic_name
             others = self.get_publishers_info_by_topic(name)
-            found += reports.endpoint_mismatches(name, topic.qos, others, own_side_publishes=False)
+            found += reports.endpoint_mismatches(name, topic.qos, others, publishing=False, settled=settled)
         for topic, publisher in zip((*OUTPUTS, STATE), (*self._outputs.values(), self._state), strict=True):
             name = publisher.topic_name
             others = self.get_subscriptions_info_by_topic(name)
-            found += reports.endpoint_mismatches(name, topic.qos, others, own_side_publishes=True)
+            found += reports.endpoint_mismatches(name, topic.qos, others, publishing=True, settled=settled)
         new = [text for text in found if text not in self._mismatches]
         for text in new:
             self.get_logger().error(text)
@@ -530,7 +539,14 @@ def _descriptor(setting: Setting) -> ParameterDescriptor:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is told to stop; returns the exit status."""
-    rclpy.init(args=["geomsrv", *(sys.argv[1:] if argv is None else argv)])
+    # rclpy's own handlers shut the context down before the node can be destroyed, and then its endpoints linger in the
+    # graph of the others until their leases run out.
+    rclpy.init(
+        args=["geomsrv", *(sys.argv[1:] if argv is None else argv)], signal_handler_options=SignalHandlerOptions.NO
+    )
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
     try:
         node = GeomsrvNode()
     except (ParameterException, GeometryError) as fault:
@@ -539,17 +555,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    try:
-        while rclpy.ok():
-            try:
-                executor.spin_once()
-            except (KeyboardInterrupt, ExternalShutdownException):
-                break
-            except Exception:
-                # Callbacks guard themselves; this is for what rclpy does around them.
-                node.get_logger().error(traceback.format_exc())
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+    # The main thread waits for a signal; waiting for messages it would not hear one.
+    spinning = threading.Thread(target=_spin, args=(executor, node, stop), name="executor")
+    spinning.start()
+    stop.wait()
+    executor.shutdown()
+    spinning.join()
+    node.destroy_node()
+    rclpy.try_shutdown()
     return 0
+
+
+def _spin(executor: SingleThreadedExecutor, node: GeomsrvNode, stop: threading.Event) -> None:
+    """Serve until told to stop."""
+    while not stop.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            stop.set()
+        except Exception:
+            # Callbacks guard themselves; this is for what rclpy does around them.
+            if not stop.is_set():
+                node.get_logger().error(traceback.format_exc())

@@ -163,17 +163,34 @@ def _seconds(duration: Any) -> float:
     return np.inf if nanoseconds == 0 or nanoseconds >= np.iinfo(np.int64).max else nanoseconds * 1e-9
 
 
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"  # what rmw calls the node of an endpoint that it has not been told about
+
+
 def endpoint_mismatches(
-    topic: str, own_profile: Any, endpoints: Iterable[Any], *, own_side_publishes: bool
+    topic: str, own_profile: Any, endpoints: Iterable[Any], *, publishing: bool, settled: bool
 ) -> list[str]:
-    """One sentence per endpoint of `topic` that does not get through to ours: its node, the topic, the policy."""
+    """One sentence per endpoint of `topic` that does not get through to ours: its node, the topic, the policy.
+
+    Parameters
+    ----------
+    topic : str
+    own_profile : QoSProfile
+    endpoints : iterable of TopicEndpointInfo
+        Of the other side.
+    publishing : bool
+        Whether our side is the one that publishes.
+    settled : bool
+        Whether to report endpoints whose node is not known, too.
+    """
     sentences = []
+    side = "subscription" if publishing else "publisher"
     for endpoint in endpoints:
         offered, requested = endpoint.qos_profile, own_profile
-        if own_side_publishes:
+        if publishing:
             offered, requested = requested, offered
-        namespace = endpoint.node_namespace.rstrip("/")
-        node, side = f"{namespace}/{endpoint.node_name}", "subscription" if own_side_publishes else "publisher"
-        for fault in policy_mismatches(offered, requested):
-            sentences.append(f"{side} of node {node} on {topic} is not connected: {fault}")
+        known = endpoint.node_name != UNKNOWN_NODE
+        who = f"node {endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}" if known else "an unknown node"
+        if known or settled:
+            faults = policy_mismatches(offered, requested)
+            sentences += [f"{side} of {who} on {topic} is not connected: {fault}" for fault in faults]
     return sentences
