@@ -250,7 +250,8 @@ class Engine:
         turn, origin = world.rotations[pairs[:, 0]], world.poses[pairs[:, 0], :3]
 
         def local(vectors: FloatArray) -> FloatArray:
-            return np.einsum("kji,kj->ki", turn, vectors)
+            turned: FloatArray = np.einsum("kji,kj->ki", turn, vectors)
+            return turned
 
         self.cross_check.submit(
             [(shapes[i], shapes[j]) for i, j in pairs.tolist()],

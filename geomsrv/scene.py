@@ -48,7 +48,7 @@ class SceneObject:
     ----------
     id : str
         Not empty.
-    shape : Shape
+    shape : Shape or Frustum
     pose : (7,) float
         x y z [m], qx qy qz qw: pose of the shape in `frame`.  A `Polygon` must stay in the plane: z = 0, no
         tilt.
@@ -69,7 +69,7 @@ class SceneObject:
     """
 
     id: str
-    shape: Shape
+    shape: Shape | Frustum
     pose: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     twist: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     frame: str = ""

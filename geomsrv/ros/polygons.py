@@ -107,7 +107,8 @@ def _distance_to_segment(points: FloatArray, a: FloatArray, b: FloatArray) -> Fl
     along = b - a
     length2 = float(along @ along)
     t = np.clip((points - a) @ along / length2, 0.0, 1.0) if length2 > 0.0 else np.zeros(len(points))
-    return np.hypot(*(a + t[:, None] * along - points).T)
+    away: FloatArray = np.hypot(*(a + t[:, None] * along - points).T)
+    return away
 
 
 @dataclass(frozen=True)
