@@ -9,7 +9,7 @@ that is not active is never entered, and the counters prove it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -192,19 +192,26 @@ class Engine:
 
     def evaluate(self, asked: frozenset[str]) -> Evaluation:
         """Answers for the topics that somebody listens to, `asked` as for `plan`."""
+        return Evaluation(**dict(self.steps(asked)))
+
+    def steps(self, asked: frozenset[str]) -> Iterator[tuple[str, Any]]:
+        """The same one by one, topic and answer, for those who have other things to do in between."""
         on = frozenset(stage.name for stage in self.plan(asked) if stage.active)
         self.counters["evaluations"] += 1
-        try:
-            return Evaluation(
-                contacts=self._contacts(on) if "contact" in on else None,
-                distances=self._distances(on) if "distance" in on else None,
-                visible=self._visible() if "cull" in on else None,
-            )
-        except Exception:
-            self.counters["evaluations failed"] += 1
-            raise
+        for topic, stage, answer in (
+            (CONTACTS, "contact", self._contacts),
+            (DISTANCES, "distance", self._distances),
+            (VISIBLE, "cull", self._visible),
+        ):
+            if stage in on:
+                try:
+                    found = answer(on)
+                except Exception:
+                    self.counters["evaluations failed"] += 1
+                    raise
+                yield topic, found
 
-    def _visible(self) -> SceneCull:
+    def _visible(self, _: frozenset[str]) -> SceneCull:
         assert self.camera is not None  # the plan says so
         self.counters["cull"] += 1
         return self.scene.cull(self.camera, accuracy=self.config.accuracy)

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geomsrv import _validate
 from geomsrv.answers import ContactStatus
 from geomsrv.engine import SceneContacts
 from geomsrv.hull import hull_triangles
@@ -51,6 +50,8 @@ POINT_SIZE = 0.02  # [m]
 NORMAL_LENGTH = 0.15  # [m]
 HALF_SPACE_SIZE = 10.0  # [m], edge of the square that stands for its boundary
 CONE_SIDES = 24
+
+AT_A_TIME = 200  # objects drawn before others get their turn: some 5 ms
 
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -145,31 +146,40 @@ class Markers:
         self._shown: dict[str, int] = {}  # namespace -> number of markers
         self._models: dict[str, tuple[Any, list[tuple[Part, Any]]]] = {}  # object id -> shape, its markers
 
-    def build(self, scene: Scene, camera: Frustum | None, contacts: SceneContacts | None, header: Any) -> list[Any]:
-        """Every marker of the scene as it is now, and a DELETE for each that has gone."""
+    def build(
+        self, scene: Scene, camera: Frustum | None, contacts: SceneContacts | None, header: Any
+    ) -> Iterator[list[Any]]:
+        """Every marker of the scene as it is now, and a DELETE for each that has gone, some at a time."""
         touching = _touching(contacts)
         groups: dict[str, list[Any]] = {}
-        for name in scene.ids:
-            item = scene[name]
-            colour = RED if name in touching else BLUE if any(np.asarray(item.twist)) else GREY
-            groups[f"shapes/{name}"] = self._shape(name, item.shape, item.pose, colour)
-        self._models = {name: model for name, model in self._models.items() if name in scene}
+        world = scene.world
+        moving = world.moves | world.turns
+        done = 0
+        for row, name in enumerate(world.ids):
+            colour = RED if name in touching else BLUE if moving[row] else GREY
+            shape = world.table.shapes[world.shape[row]]
+            groups[f"shapes/{name}"] = self._shape(name, shape, world.poses[row], world.rotations[row], colour)
+            if row - done >= AT_A_TIME:
+                done = row
+                yield []
+        self._models = {name: model for name, model in self._models.items() if name in world.index}
         if camera is not None:
             groups["camera"] = [self._marker(part, IDENTITY, CYAN) for part in parts(camera)]
         if contacts is not None:
             groups["contacts"] = list(self._contact_markers(contacts))
-        return self._finish(groups, header)
+        yield self._finish(groups, header)
 
-    def _shape(self, name: str, shape: Shape | Frustum, pose: ArrayLike, colour: tuple[float, ...]) -> list[Any]:
+    def _shape(
+        self, name: str, shape: Shape | Frustum, pose: FloatArray, rotation: FloatArray, colour: tuple[float, ...]
+    ) -> list[Any]:
         """Markers of one object; their geometry is made once per shape."""
         known = self._models.get(name)
         if known is None or known[0] is not shape:
             models = [(part, self._marker(part, IDENTITY, colour)) for part in parts(shape)]
             self._models[name] = known = (shape, models)
-        row = np.asarray(pose, dtype=np.float64)
-        rotation = _validate.rotation_matrices(row[None, 3:])[0]
         for part, marker in known[1]:
-            convert.set_pose(marker.pose, [*(row[:3] + rotation @ np.array(part.offset)), *row[3:]])
+            place = pose[:3] + rotation @ part.offset if any(part.offset) else pose[:3]
+            convert.set_pose(marker.pose, [*place, *pose[3:]])
             _set_colour(marker, colour)
         return [marker for _, marker in known[1]]
 

@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import rclpy
@@ -103,7 +103,9 @@ MAX_RECHECKS = 8
 
 # Drawing takes at most this share of the node's time, evaluating at most that one; the rest is for inputs and services.
 MARKER_SHARE = 0.1
-EVALUATION_SHARE = 0.5
+EVALUATION_SHARE = 0.3
+
+LOG_FAILURE_AFTER = 5.0  # [s]
 
 
 def _guarded(callback: Callable[..., None]) -> Callable[..., None]:
@@ -114,7 +116,7 @@ def _guarded(callback: Callable[..., None]) -> Callable[..., None]:
         try:
             callback(self, *arguments)
         except Exception:
-            self.get_logger().error(f"{callback.__name__}: {traceback.format_exc()}")
+            self.log_failure(callback.__name__)
 
     return call
 
@@ -135,12 +137,20 @@ class GeomsrvNode(LifecycleNode):
         self._engine: Engine | None = None
         self._active = False
         self._enabled = True
+        self._failures: dict[str, float] = {}
         # rclpy lets the exception of a transition that does not exist leave the executor.
         change = self._service_change_state
         change.callback = functools.partial(self._change_state, change.callback)
         if self._config.autostart:
             self.trigger_configure()
             self.trigger_activate()
+
+    def log_failure(self, where: str) -> None:
+        """Log the exception being handled, in full; again after a while only, since what fails tends to fail on."""
+        now = time.monotonic()
+        if now - self._failures.get(where, -math.inf) > LOG_FAILURE_AFTER:
+            self._failures[where] = now
+            self.get_logger().error(f"{where}: {traceback.format_exc()}")
 
     # -------------------------------------------------------------------------------------------------- parameters
 
@@ -245,9 +255,7 @@ class GeomsrvNode(LifecycleNode):
 
         self._outputs: dict[str, Any] = {}
         for topic in OUTPUTS:
-            events = PublisherEventCallbacks(
-                incompatible_qos=self._incompatible, matched=self._subscriber_came if topic.name == MARKERS else None
-            )
+            events = PublisherEventCallbacks(incompatible_qos=self._incompatible, matched=self._subscriber_came)
             self._outputs[topic.name] = self.create_lifecycle_publisher(
                 topic.type, f"~/{topic.name}", topic.qos, event_callbacks=events
             )
@@ -334,12 +342,15 @@ class GeomsrvNode(LifecycleNode):
         if apply(message):
             self._input_arrived()
 
+    def _subscriber_came(self, _: Any) -> None:
+        """Somebody listens who did not before, and wants what may not have been computed yet."""
+        self._input_arrived()
+
     @_guarded
     def _input_arrived(self) -> None:
         """Evaluate as soon as `max_rate` allows, all that came in until then together."""
         if self._active and self._enabled:
             self._evaluation.request(1.0 / self._config.max_rate)
-            self._request_drawing()
 
     def _asked(self) -> frozenset[str]:
         """Topics that somebody listens to."""
@@ -352,43 +363,39 @@ class GeomsrvNode(LifecycleNode):
         header.stamp = stamp if stamp is not None and (stamp.sec or stamp.nanosec) else self.get_clock().now().to_msg()
         return header
 
-    @_guarded
-    def _evaluate(self) -> None:
+    def _evaluate(self) -> Iterator[None]:
+        """Compute and publish topic by topic, so that inputs and requests get their turn in between."""
         engine = self._engine
         if engine is None or not (self._active and self._enabled):
             return
-        answer, header = engine.evaluate(self._asked()), self._header()
-        self._last_contacts = answer.contacts
-        if answer.contacts is not None:
-            contacts = msg.ContactArray(header=header)
-            convert.set_contacts(contacts, answer.contacts, msg.Contact, Point)
-            self._outputs[CONTACTS].publish(contacts)
-        if answer.distances is not None:
-            distances = msg.DistanceArray(header=header, max_distance=self._config.max_distance)
-            convert.set_distances(distances, answer.distances, msg.PairDistance)
-            self._outputs[DISTANCES].publish(distances)
-        if answer.visible is not None and engine.camera is not None:
-            visible = msg.VisibleArray(header=header)
-            convert.set_visible(visible, answer.visible, engine.camera)
-            self._outputs[VISIBLE].publish(visible)
-
-    def _request_drawing(self) -> None:
+        for topic, answer in engine.steps(self._asked()):
+            header = self._header()
+            message: Any
+            if topic == CONTACTS:
+                self._last_contacts = answer
+                message = msg.ContactArray(header=header)
+                convert.set_contacts(message, answer, msg.Contact, Point)
+            elif topic == DISTANCES:
+                message = msg.DistanceArray(header=header, max_distance=self._config.max_distance)
+                convert.set_distances(message, answer, msg.PairDistance)
+            elif engine.camera is not None:
+                message = msg.VisibleArray(header=header)
+                convert.set_visible(message, answer, engine.camera)
+            self._outputs[topic].publish(message)
+            yield
+        # The drawing shows the contacts just found.
         if self._config.effects_markers and self._outputs[MARKERS].get_subscription_count():
             self._drawing.request(1.0 / self._config.markers_rate)
 
-    @_guarded
-    def _subscriber_came(self, _: Any) -> None:
-        if self._active:
-            self._request_drawing()
-
-    @_guarded
-    def _draw(self) -> None:
+    def _draw(self) -> Iterator[None]:
         engine = self._engine
         if engine is None or not (self._active and self._config.effects_markers):
             return
-        header = self._header()
         engine.counters["drawings"] += 1
-        markers = self._markers.build(engine.scene, engine.camera, self._last_contacts, header)
+        markers: list[Any] = []
+        for part in self._markers.build(engine.scene, engine.camera, self._last_contacts, self._header()):
+            markers += part
+            yield
         self._outputs[MARKERS].publish(MarkerArray(markers=markers))
 
     # ----------------------------------------------------------------------------------------------------- reports
@@ -454,45 +461,69 @@ class GeomsrvNode(LifecycleNode):
 
 
 class _Paced:
-    """Runs an action on request, but not too often and for no more than a share of the time.
+    """Does work on request, but not too often, for no more than a share of the time, and step by step.
 
     Parameters
     ----------
     node : GeomsrvNode
-    action : callable
+    work : callable
+        Gives an iterator; the executor serves others between its steps.
     share : float
-        Largest part of the time that the action may take, in (0, 1].
+        Largest part of the time that the work may take, in (0, 1].
     """
 
-    def __init__(self, node: GeomsrvNode, action: Callable[[], None], share: float) -> None:
-        self._action = action
+    def __init__(self, node: GeomsrvNode, work: Callable[[], Iterator[None]], share: float) -> None:
+        self._node = node
+        self._work = work
         self._pause_per_second = 1.0 / share - 1.0
         self._started = self._earliest = -math.inf
+        self._spent = 0.0
+        self._steps: Iterator[None] | None = None
+        self._again: float | None = None  # a request that came while the work was under way: its period
         self._waiting = False
         self._timer = node.create_timer(1.0, self._run, clock=node._steady)
         self._timer.cancel()
         node._timers_made.append(self._timer)
 
     def request(self, period: float) -> None:
-        """Run now if the last run began `period` seconds ago, else as soon as that is so."""
-        if self._waiting:
-            return
-        now = time.monotonic()
-        wait = max(self._started + period, self._earliest) - now
-        if wait <= 0.0:
-            self._run()
-        else:
-            self._waiting = True
-            self._timer.timer_period_ns = int(wait * 1e9)
-            self._timer.reset()
+        """Begin now if the last time began `period` seconds ago, else as soon as that is so."""
+        if self._steps is not None:
+            self._again = period
+        elif not self._waiting:
+            wait = max(self._started + period, self._earliest) - time.monotonic()
+            if wait <= 0.0:
+                self._run()
+            else:
+                self._wake_after(wait)
+
+    def _wake_after(self, seconds: float) -> None:
+        self._waiting = True
+        self._timer.timer_period_ns = max(int(seconds * 1e9), 1)
+        self._timer.reset()
 
     def _run(self) -> None:
+        """One step."""
         self._timer.cancel()
         self._waiting = False
-        self._started = time.monotonic()
-        self._action()
+        begin = time.monotonic()
+        if self._steps is None:
+            self._started, self._spent, self._steps = begin, 0.0, self._work()
+        try:
+            next(self._steps)
+        except StopIteration:
+            self._steps = None
+        except Exception:
+            self._steps = None
+            self._node.log_failure(self._work.__name__)
         end = time.monotonic()
-        self._earliest = end + self._pause_per_second * (end - self._started)
+        self._spent += end - begin
+        if self._steps is not None:
+            self._wake_after(0.0)
+            return
+        self._earliest = end + self._pause_per_second * self._spent
+        period, self._again = self._again, None
+        if period is not None:
+            self.request(period)
 
 
 class _Transforms:
