@@ -317,6 +317,25 @@ def test_named(name: str, swap: bool) -> None:
         assert plain.distance[0] == plain.lower[0] == 0.0
 
 
+@pytest.mark.parametrize("kind", ["sphere", "capsule", "convex"])
+def test_the_very_end_of_a_turned_capsule(kind: str, rng: np.random.Generator) -> None:
+    """A gap that is all rounding points anywhere, back along the axis too; the depth must not care."""
+    for _ in range(200):
+        a = {
+            "sphere": gs.Sphere(0.25),
+            "capsule": gs.Capsule(0.25, 0.0),
+            "convex": gs.Convex([[0.0, 0.0, 0.0]]),
+        }[kind]
+        b = gs.Capsule(0.5, 2.0 * rng.uniform(0.5, 1.0))
+        turn = random_turn(rng)
+        pose = np.concatenate([rotation(turn) @ [0, 0, rng.choice([-1, 1]) * b.length / 2], turn])
+        answer = gs.distance(a, b, pose, want=DEEP)
+        expected = -0.5 if kind == "convex" else -0.75
+        text = reproducer(length=b.length, pose=pose)
+        assert answer.status[0] == gs.DistanceStatus.OK, text
+        assert abs(answer.distance[0] - expected) <= 4 * EPS, text
+
+
 def test_half_spaces_that_lean_share_everything() -> None:
     """However little: somewhere far away the planes cross, and beyond that no translation parts the solids."""
     up, down = gs.HalfSpace([0, 0, 1], 0.0), gs.HalfSpace([0, 0, -1], -1.0)

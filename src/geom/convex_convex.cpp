@@ -37,7 +37,6 @@ CoreSeparation sunk(const Core& a, const Core& b, const Gjk& found, Stage stage)
     }
     out.outcome = Outcome::ok;
     out.normal = nan_vector();
-    out.sunk = true;
     return out;
 }
 

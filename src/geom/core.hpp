@@ -18,27 +18,33 @@
 
 namespace geomsrv {
 
-/// A convex polytope: center + all sums of +-generators (point, segment, box), or center + the hull of listed
+/// A convex polytope: center + all sums of +-generators (point, segment, box), or center + the hull of
 /// points.
 struct Core {
     Vec3 center;
-    Vec3 generator[3];   ///< half edges of a zonotope, taken literally
-    int generators = 0;  ///< 0 point, 1 segment, 3 box; 0 for a hull
-    const double* points =
-        nullptr;  ///< hull: count x, count y, count z, relative to `center`; nullptr for a zonotope
+    Vec3 generator[3];               ///< half edges of a zonotope, taken literally
+    int generators = 0;              ///< 0 point or hull, 1 segment, 3 box
+    const double* points = nullptr;  ///< hull: count x, count y, count z; nullptr for a zonotope
     int count = 0;
     double reach = 0.0;  ///< upper bound of |center| + the longest of what is added to it
     double error = 0.0;  ///< how far a vertex may be from the one that the caller's numbers mean
 };
 
-/// Extreme value of normal . v over the vertices, and where it is attained.
+/// Extreme value of normal . v over the vertices, and the vertex where it is attained: an index into the
+/// points of a hull; of a zonotope, bit i is set where generator i is added.
 struct Extreme {
     double value = 0.0;
-    int vertex =
-        0;  ///< index into the hull's points; bit i of a zonotope's corner is set where generator i is added
+    int vertex = 0;
 };
 
-/// A vertex, rounded: off by at most kVertexError * reach.
+// A vertex, rounded: three sums, each rounding a vector no longer than the reach.
+inline constexpr double kVertexError = 3 * kUnitRoundoff;
+
+// A support: a dot product is off by 3 u of the sizes of its factors, which together are no longer than the
+// reach; at most three sums follow, none larger than the reach; one more u covers the higher orders.
+inline constexpr double kSupportError = 7 * kUnitRoundoff;
+
+/// Off by at most kVertexError * reach.
 inline Vec3 vertex_of(const Core& core, int vertex) {
     if (core.points != nullptr) {
         const double* p = core.points + vertex;
@@ -50,10 +56,8 @@ inline Vec3 vertex_of(const Core& core, int vertex) {
     }
     return v;
 }
-// Three sums, each rounding a vector no longer than the reach.
-inline constexpr double kVertexError = 3 * kUnitRoundoff;
 
-/// Highest vertex along a direction of length 1 + 4 u; the value is off by at most kSupportError * reach.
+/// Highest vertex along a direction of length 1 +- 4 u; the value is off by at most kSupportError * reach.
 inline Extreme highest(const Core& core, Vec3 n) {
     if (core.points != nullptr) {
         const double* x = core.points;
@@ -77,9 +81,6 @@ inline Extreme highest(const Core& core, Vec3 n) {
     }
     return top;
 }
-// A dot product is off by 3 u of the sizes of its factors, which together are no longer than the reach; at
-// most three sums follow, none larger than the reach; one more u covers the higher orders.
-inline constexpr double kSupportError = 7 * kUnitRoundoff;
 
 inline Extreme lowest(const Core& core, Vec3 n) {
     const Extreme top = highest(core, -n);

@@ -79,7 +79,7 @@ PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X_ls, 
     const double size = std::abs(own_offset) + safe_norm(narrow(shift));
     // Numbers whose sum fits in two doubles have been added exactly: a low part of 0 says that nothing was
     // rounded.
-    const double lost = offset.lo == 0.0 ? 0.0 : 8 * kWideRoundoff * size;
+    const double lost = offset.lo == 0.0 && normal.error == 0.0 ? 0.0 : 8 * kWideRoundoff * size;
     const double normal_lost = normal.error == 0.0 ? 0.0 : 8 * kWideRoundoff;
     return {normal.value, offset.hi, normal.error + normal_lost, std::abs(offset.lo) + lost};
 }
@@ -89,7 +89,7 @@ void place_hull(const ShapeView& shape, const Transform& X_ls, const LocalFrame&
     const HullExtent extent = shape.extent != nullptr ? *shape.extent : extent_of(shape);
     const double scale = frame.scale;
     const Vec3 m = scale * extent.middle;
-    const double spread = scale * extent.spread;
+    const double spread = safe_norm(scale * extent.half) * kRoundedUp;
     const auto n = static_cast<std::size_t>(shape.count);
     double* x = scratch;
     double* y = x + n;
@@ -147,10 +147,10 @@ HullExtent extent_of(const ShapeView& shape) {
     }
     // Halves first: the sum of two large coordinates must not overflow.
     const Vec3 middle = 0.5 * lower + 0.5 * upper;
-    const Vec3 far = {std::max(upper.x - middle.x, middle.x - lower.x),
-                      std::max(upper.y - middle.y, middle.y - lower.y),
-                      std::max(upper.z - middle.z, middle.z - lower.z)};
-    return {middle, safe_norm(far) * kRoundedUp};
+    return {
+        middle,
+        {std::max(upper.x - middle.x, middle.x - lower.x), std::max(upper.y - middle.y, middle.y - lower.y),
+         std::max(upper.z - middle.z, middle.z - lower.z)}};
 }
 
 Vec3 middle_of(const ShapeView& shape) {
@@ -161,16 +161,21 @@ Vec3 middle_of(const ShapeView& shape) {
 }
 
 double magnitude_of(const ShapeView& shape, const Transform& X_ls) {
-    double largest = largest_of(X_ls.translation);
-    const int first = shape.kind == ShapeKind::half_space ? 3 : shape.kind == ShapeKind::capsule ? 1 : 0;
-    const int last = shape.kind == ShapeKind::box ? 3 : first + 1;
-    for (int i = first; i < last && shape.kind != ShapeKind::sphere; ++i) {
-        largest = std::max(largest, std::abs(shape.params[i]));
+    const double largest = largest_of(X_ls.translation);
+    switch (shape.kind) {
+        case ShapeKind::capsule:
+            return std::max(largest, shape.params[1]);
+        case ShapeKind::box:
+            return std::max(largest, largest_of({shape.params[0], shape.params[1], shape.params[2]}));
+        case ShapeKind::half_space:
+            return std::max(largest, std::abs(shape.params[3]));
+        case ShapeKind::convex: {
+            const HullExtent extent = shape.extent != nullptr ? *shape.extent : extent_of(shape);
+            return std::max({largest, largest_of(extent.middle), largest_of(extent.half)});
+        }
+        default:
+            return largest;
     }
-    for (std::ptrdiff_t i = 0; i < 3 * shape.count; ++i) {
-        largest = std::max(largest, std::abs(shape.vertices[i]));
-    }
-    return largest;
 }
 
 Placed place(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch) {

@@ -29,7 +29,7 @@ HullExtent extent_of(const ShapeView& shape);
 /// of others. Not meaningful for a half space.
 Vec3 middle_of(const ShapeView& shape);
 
-/// The largest coordinate of anything the shape and its pose consist of.
+/// Size of the largest number that placing the shape works with, radii apart.
 double magnitude_of(const ShapeView& shape, const Transform& X_ls);
 
 /// X_ls: pose of the shape in the frame's axes.  `scratch` takes the 3 * count coordinates of a hull.

@@ -3,6 +3,9 @@
 #include "geom/point_segment.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "geom/convex_convex.hpp"
 
 namespace geomsrv {
 
@@ -21,7 +24,8 @@ CoreSeparation point_segment(const Core& a, const Core& b) {
     const Vec3 normal = on ? perpendicular(g) : normalized(gap);
     CoreSeparation out = certify_apart(a, b, normal, a.center, b.center + x * g);
     out.stage = Stage::closed_form;
-    return out;
+    // At an end of the segment a gap that is all rounding may point back along it.
+    return out.converged ? out : convex_convex(a, b, true);
 }
 
 }  // namespace geomsrv

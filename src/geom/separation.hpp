@@ -55,7 +55,6 @@ struct CoreSeparation {
     Outcome outcome = Outcome::ok;
     Stage stage = Stage::none;
     bool converged = false;  ///< lower and upper estimate have met; if not, a stronger method may do better
-    bool sunk = false;       ///< the cores have a common point and nobody asked how deep it is
     int iterations = 0;
     Witness witness;
 };

@@ -31,8 +31,8 @@ inline constexpr std::size_t kShapeKinds = sizeof(kShapeNames) / sizeof(kShapeNa
 
 /// Where the points of a hull lie.
 struct HullExtent {
-    Vec3 middle;          ///< of their bounding box
-    double spread = 0.0;  ///< no point is further from the middle
+    Vec3 middle;  ///< of their bounding box
+    Vec3 half;    ///< half its sides, or an ulp more
 };
 
 /// One shape in its own frame; the arrays belong to the caller.
