@@ -46,6 +46,7 @@ def test_a_cube_with_points_on_its_faces() -> None:
         corners = points[triangles]
         volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
         assert volume == pytest.approx(np.ptp(points[:, 0]) ** 3)
+        assert len(triangles) == 12, "points on faces and edges are no corners"
 
 
 @pytest.mark.parametrize("axis", range(3))

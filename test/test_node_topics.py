@@ -6,6 +6,9 @@ from __future__ import annotations
 
 import array
 import math
+import sys
+from importlib.machinery import ModuleSpec
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -340,3 +343,55 @@ def test_stalled_states_are_noticed(client, ports, inboxes) -> None:
     ports["states"].publish(states(5000, ["a"], [(0, 0, 0)]))
     status = diagnosis(inboxes, "inputs", lambda s: "~/states stopped" in s.message)
     assert status.level == b"\x01"
+
+
+def test_with_tf2_other_frames_are_transformed(monkeypatch) -> None:
+    """A stand-in for tf2_ros, which the wheels lack: "arm" is 10 m along x, turned by 90 degrees about z."""
+    tf2 = ModuleType("tf2_ros")
+    tf2.__spec__ = ModuleSpec("tf2_ros", None)
+
+    class Buffer:
+        def __init__(self, node) -> None:
+            assert node.get_name() == "geomsrv"
+
+        def lookup_transform(self, target, source, time):
+            if (target, source) != ("world", "arm"):
+                raise LookupError(f"no {source}")
+            translation = SimpleNamespace(x=10.0, y=0.0, z=0.0)
+            return SimpleNamespace(
+                transform=SimpleNamespace(
+                    translation=translation, rotation=SimpleNamespace(x=0.0, y=0.0, z=math.sqrt(0.5), w=math.sqrt(0.5))
+                )
+            )
+
+    tf2.Buffer, tf2.TransformListener = Buffer, lambda buffer, node: None
+    monkeypatch.setitem(sys.modules, "tf2_ros", tf2)
+    client = Client("framed")
+    try:
+        with running_node(max_rate=1000.0) as node:
+            add = [body("a", gs.Sphere(0.5), (1, 0, 0), (1, 0, 0), frame="arm"), body("b", gs.Sphere(0.5), frame="leg")]
+            got = client.call(srv.ApplyScene, "apply_scene", update=msg.SceneUpdate(add=add))
+            assert got.ids == ["b"] and "'leg'" in got.faults[0] and "no leg" in got.faults[0]
+            assert client.call(srv.ApplyScene, "apply_scene", update=msg.SceneUpdate(add=add[:1])).status == 0
+
+            def placed() -> list[float]:
+                (item,) = client.call(srv.GetScene, "get_scene", ids=["a"]).scene.add
+                position, velocity = item.pose.position, item.twist.linear
+                return [round(x, 9) for x in (position.x, position.y, velocity.x, velocity.y)]
+
+            assert placed() == [10.0, 1.0, 0.0, 1.0]
+            port = client.publisher(msg.ShapeStates, "states", QOS["states"])
+            message = stamped(states(1, ["a"], [(2, 0, 0)], [[0, 1, 0, 0, 0, 0]]), 1, "arm")
+            client.until(lambda: port.publish(message) or placed() == [10.0, 2.0, -1.0, 0.0], "the new state")
+            polygons = client.publisher(PolygonInstanceStamped, "polygons", QOS["polygons"])
+            polygons.publish(polygon(1, SQUARE, 1, "arm"))
+            client.until(lambda: "polygon/1" in node.node._engine.scene, "the polygon")
+            ring = node.node._engine.scene["polygon/1"]
+            corners = {tuple(np.round(p + ring.pose[:2], 6)) for p in ring.shape.vertices}
+            assert corners == {(10, 0), (10, 1), (9, 1), (9, 0)}
+            refused(node, client, "polygons", "'leg'", lambda: polygons.publish(polygon(1, SQUARE, 2, "leg")))
+            camera = client.publisher(CameraInfo, "camera_info", QOS["camera_info"])
+            client.until(lambda: camera.publish(camera_info(1, "arm")) or node.node._engine.camera, "the camera")
+            assert node.node._engine.camera.origin.tolist() == [10, 0, 0]
+    finally:
+        client.close()

@@ -20,6 +20,14 @@ def rounded(points):
     return np.asarray(points, dtype=np.float64).astype(np.float32).astype(np.float64)
 
 
+def ring_of(points):
+    return convex_ring(points, float32_floor(points))
+
+
+def moved_by(before, after, seconds):
+    return displacement(before, after, float32_floor(before) + float32_floor(after), seconds)
+
+
 def test_the_floor_bounds_the_rounding(rng) -> None:
     """Exactly, over all magnitudes, subnormal numbers included."""
     exponents = rng.integers(-160, 120, size=4000)
@@ -49,7 +57,7 @@ def test_honest_rings_are_accepted(rng, size) -> None:
             gs.Polygon(points)
         except gs.GeometryError:
             bent += 1
-        got = convex_ring(points)
+        got = ring_of(points)
         polygon = gs.Polygon(got)  # convex and counter-clockwise, exactly
         assert {tuple(p) for p in polygon.vertices} <= {tuple(p) for p in points}
         # No point that came is farther from the ring than its floor allows.
@@ -63,8 +71,8 @@ def test_honest_rings_are_accepted(rng, size) -> None:
 @pytest.mark.parametrize("repeat", [(), (1,), (0, 2, 2)])
 def test_starting_points_and_repeated_vertices_do_not_matter(start, repeat) -> None:
     points = np.insert(np.roll(SQUARE, start, axis=0), repeat, np.roll(SQUARE, start, axis=0)[list(repeat)], axis=0)
-    assert {tuple(p) for p in convex_ring(points)} == {tuple(p) for p in SQUARE}
-    assert len(convex_ring(points)) == 4
+    assert {tuple(p) for p in ring_of(points)} == {tuple(p) for p in SQUARE}
+    assert len(ring_of(points)) == 4
 
 
 @pytest.mark.parametrize(
@@ -72,14 +80,14 @@ def test_starting_points_and_repeated_vertices_do_not_matter(start, repeat) -> N
     [([(3, 4)], 1), ([(3, 4)] * 3, 1), ([(0, 0), (1, 1)], 2), ([(0, 0), (1, 1), (2, 2), (1, 1)], 2)],
 )
 def test_points_and_segments_are_rings(points, count) -> None:
-    assert len(convex_ring(np.array(points, dtype=float))) == count
+    assert len(ring_of(np.array(points, dtype=float))) == count
 
 
 def test_slivers_have_no_sense_of_turning() -> None:
     flat = rounded([(0, 0), (1, 1 / 3), (2, 2 / 3), (1, 1 / 3)])
     flat[1, 1] = np.nextafter(np.float32(flat[1, 1]), np.float32(1))  # turns it clockwise by its last bit
-    assert len(convex_ring(flat)) >= 2
-    assert len(convex_ring(flat[::-1])) >= 2
+    assert len(ring_of(flat)) >= 2
+    assert len(ring_of(flat[::-1])) >= 2
 
 
 STAR = np.array([[np.cos(a), np.sin(a)] for a in 4 * np.pi / 5 * np.arange(5)])
@@ -96,23 +104,21 @@ STAR = np.array([[np.cos(a), np.sin(a)] for a in 4 * np.pi / 5 * np.arange(5)])
         (np.concatenate([SQUARE, SQUARE]), "not convex"),
         (np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0.5)]), "not convex at its point 4"),
         (np.zeros((0, 2)), "no points"),
-        (np.array([(0, 0), (np.nan, 0), (0, 1)]), "point 1 is"),
-        (np.array([(0, 0), (1, 0), (np.inf, 1)]), "point 2 is"),
     ],
 )
 def test_other_rings_are_refused_by_name(points, text) -> None:
     with pytest.raises(gs.GeometryError, match=text):
-        convex_ring(np.asarray(points, dtype=float))
+        ring_of(np.asarray(points, dtype=float))
 
 
 def test_a_dent_deeper_than_the_floor_is_refused() -> None:
     for depth, fine in ((1e-7, True), (1e-6, False)):
         ring = rounded([(0, 0), (0.5, depth), (1, 0), (1, 1), (0, 1)])
         if fine:
-            assert len(convex_ring(ring)) == 4
+            assert len(ring_of(ring)) == 4
         else:
             with pytest.raises(gs.GeometryError, match="not convex at its point 1"):
-                convex_ring(ring)
+                ring_of(ring)
 
 
 def test_translations_are_found_up_to_the_floor(rng) -> None:
@@ -121,7 +127,7 @@ def test_translations_are_found_up_to_the_floor(rng) -> None:
         count, place = int(rng.integers(1, 12)), rng.uniform(-100, 100, 2)
         ring, moved = rng.uniform(-1, 1, (count, 2)) + place, rng.uniform(-3, 3, 2)
         seconds = float(rng.uniform(0.01, 2))
-        got = displacement(rounded(ring), rounded(ring + moved), seconds)
+        got = moved_by(rounded(ring), rounded(ring + moved), seconds)
         assert not got.fault, reproducer(ring=ring, moved=moved)
         error = np.hypot(*(np.array(got.velocity) - moved / seconds))
         assert error <= got.velocity_floor * (1 + 1e-9), reproducer(ring=ring, moved=moved, seconds=seconds)
@@ -131,21 +137,25 @@ def test_translations_are_found_up_to_the_floor(rng) -> None:
 
 def test_rotations_and_deformations_are_not() -> None:
     turn = SQUARE @ [[0.8, 0.6], [-0.6, 0.8]]
-    assert displacement(SQUARE, turn, 1.0).fault == "the motion is not a translation"
+    assert moved_by(SQUARE, turn, 1.0).fault == "the motion is not a translation"
     grown = SQUARE * 1.001
-    assert displacement(SQUARE, grown, 1.0).fault == "the motion is not a translation"
-    assert displacement(SQUARE, SQUARE[:3], 1.0).fault == "the motion is not a translation: 4 points became 3"
+    assert moved_by(SQUARE, grown, 1.0).fault == "the motion is not a translation"
     # A turn that float32 cannot see is one that nobody can see.
     tiny, there = 1e-9, SQUARE + (5, 5)
-    assert not displacement(there, rounded(there @ [[1, tiny], [-tiny, 1]]), 1.0).fault
+    assert not moved_by(there, rounded(there @ [[1, tiny], [-tiny, 1]]), 1.0).fault
 
 
 def test_tracks() -> None:
     tracks = PolygonTracks()
-    assert tracks.update("a", SQUARE, 10**9) == Motion(), "the first one: nothing is known"
-    assert tracks.update("a", SQUARE + (1, 0), 3 * 10**9).velocity == pytest.approx((0.5, 0))
-    assert tracks.update("b", SQUARE, 3 * 10**9) == Motion()
-    assert tracks.update("a", SQUARE + (9, 0), 3 * 10**9) == Motion(), "the same time again tells nothing"
-    assert tracks.update("a", SQUARE, 10**9) == Motion(), "and neither does an earlier one"
+
+    def update(name, points, seconds):
+        return tracks.update(name, points, float32_floor(points), seconds * 10**9)
+
+    assert update("a", SQUARE, 1) == Motion(), "the first one: nothing is known"
+    assert update("a", SQUARE + (1, 0), 3).velocity == pytest.approx((0.5, 0))
+    assert update("b", SQUARE, 3) == Motion()
+    assert update("a", SQUARE + (9, 0), 3) == Motion(), "the same time again tells nothing"
+    assert update("a", SQUARE, 1) == Motion(), "and neither does an earlier one"
+    assert update("a", SQUARE[:3], 2).fault == "the motion is not a translation: 4 points became 3"
     tracks.clear()
-    assert tracks.update("a", SQUARE, 5 * 10**9) == Motion()
+    assert update("a", SQUARE, 5) == Motion()

@@ -118,6 +118,12 @@ def set_twist(twist: Any, row: ArrayLike) -> None:
     v.x, v.y, v.z, w.x, w.y, w.z = np.asarray(row, dtype=np.float64).tolist()
 
 
+def points_in(frame_pose: ArrayLike, points: FloatArray) -> FloatArray:
+    """Points (n, 3) given in a frame, expressed in the frame that `frame_pose` (7,) is given in."""
+    frame = _validate.poses(frame_pose, "transform")
+    return points @ _validate.rotation_matrices(frame[:, 3:])[0].T + frame[0, :3]
+
+
 def states_in(
     frame_pose: ArrayLike, poses: FloatArray, twists: FloatArray | None
 ) -> tuple[FloatArray, FloatArray | None]:
@@ -125,7 +131,7 @@ def states_in(
     frame = _validate.poses(frame_pose, "transform")
     rotation = _validate.rotation_matrices(frame[:, 3:])[0]
     moved = np.empty_like(poses)
-    moved[:, :3] = poses[:, :3] @ rotation.T + frame[0, :3]
+    moved[:, :3] = points_in(frame_pose, poses[:, :3])
     # Hamilton product frame * q, quaternions as x y z w.
     (x, y, z, w), (a, b, c, d) = frame[0, 3:], poses[:, 3:].T
     moved[:, 3] = w * a + x * d + y * c - z * b

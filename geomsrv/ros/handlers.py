@@ -8,6 +8,7 @@ A handler computes first and fills the response last, so that a refusal never le
 from __future__ import annotations
 
 import functools
+import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -180,10 +181,11 @@ class Handlers:
         frustum, scene = self._frustum(request), self.engine.scene
         if request.select == INLINE:
             _unused(request, "ids")
-            world, counts = world_of(_bodies(request.shapes, request.poses, ())), Counter[str]()
+            start, counts = time.perf_counter_ns(), Counter[str]()
+            world = world_of(_bodies(request.shapes, request.poses, ()))
             state, certain, boxed = sight(world, np.arange(len(world)), frustum, counts)
             message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
-            cost = Cost(0, accuracy, dict(counts))
+            cost = Cost(time.perf_counter_ns() - start, accuracy, dict(counts))
         elif request.select in (BY_IDS, ALL):
             _unused(request, "shapes", "poses", *(("ids",) if request.select == ALL else ()))
             answer = scene.cull(frustum, ids=None if request.select == ALL else request.ids, accuracy=accuracy)

@@ -155,22 +155,25 @@ class Inputs:
         floor = float32_floor(points)
         frame, stamp = message.header.frame_id, message.header.stamp
         if frame and frame != self.config.fixed_frame:
-            raise GeometryError(f"frame {frame!r} is not the fixed frame {self.config.fixed_frame!r}")
+            points = convert.points_in(self.transforms(frame, stamp), points)
+            # A rotation mixes the coordinates, and all it keeps is the length of what they are off by.
+            floor = np.broadcast_to(np.linalg.norm(floor, axis=1, keepdims=True), floor.shape)
         if len(points) and (np.abs(points[:, 2] - points[0, 2]) > floor[:, 2] + floor[0, 2]).any():
             raise GeometryError("z is not the same for all points")
         if len(points) and abs(points[0, 2]) > floor[0, 2]:
             raise GeometryError(f"z is {points[0, 2]:g}; polygons must lie in the plane z = 0 of the fixed frame")
-        ring = convex_ring(points[:, :2])
-        motion = self.tracks.update(name, points[:, :2], stamp.sec * 10**9 + stamp.nanosec)
-        # The origin is a corner: whoever has to assume that it turns need not sweep a circle about the world's origin.
-        # Differences of float32 numbers are exact in float64, or off by 2^-29 of the floor.
+        points, floor = points[:, :2], floor[:, :2]
+        ring = convex_ring(points, floor)
+        motion = self.tracks.update(name, points, floor, stamp.sec * 10**9 + stamp.nanosec)
+        # The origin is a corner: whoever has to assume that the polygon turns need not sweep a circle about the
+        # world's origin.  Differences of float32 numbers are exact in float64, or off by 2^-29 of the floor.
         origin = ring[0]
         return SceneObject(
             name,
             Polygon(ring - origin),
             pose=(*origin.tolist(), 0.0, 0.0, 0.0, 0.0, 1.0),
             twist=(*motion.velocity, 0.0, 0.0, 0.0, 0.0),
-            uncertainty=float(np.hypot(*floor[:, :2].max(axis=0))),
+            uncertainty=float(np.hypot(*floor.max(axis=0))),
             velocity_uncertainty=motion.velocity_floor,
             motion_fault=motion.fault,
         )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Polygons that arrive as float32, instance by instance: which convex ring was meant, and how it moves.
 
-Every coordinate may be off by a rounding to float32, the *floor*.  So a ring counts as convex, and a displacement as a
+Every coordinate may be off by a rounding to float32, its *floor*.  So a ring counts as convex, and a displacement as a
 translation, if some exact ring or translation lies within the floor of the numbers that came.
 """
 
@@ -35,8 +35,8 @@ def float32_floor(points: FloatArray) -> FloatArray:
     return np.maximum(FLOAT32_ROUNDING * np.abs(points), FLOAT32_SMALLEST_ROUNDING)
 
 
-def convex_ring(points: FloatArray) -> FloatArray:
-    """The convex counter-clockwise ring that (n, 2) points round off.
+def convex_ring(points: FloatArray, floor: FloatArray) -> FloatArray:
+    """The convex counter-clockwise ring that (n, 2) points, each coordinate good to its floor, round off.
 
     Rounding bends straight chains by up to the floor, so that an honest ring may be slightly non-convex.  The hull of
     the rounded vertices is within the floor of the hull of the true ones, which is the true ring; so the hull is what
@@ -49,13 +49,10 @@ def convex_ring(points: FloatArray) -> FloatArray:
     """
     if len(points) == 0:
         raise GeometryError("polygon has no points")
-    if not np.isfinite(points).all():
-        i = int(np.argmax(~np.isfinite(points).all(axis=1)))
-        raise GeometryError(f"polygon point {i} is {points[i].tolist()}, must be finite")
     hull = _hull(points)
     # A true vertex is on the boundary of the true ring, which is within the floor of the hull's, and the point that
     # came is within the floor of the true vertex.
-    reach = 2.0 * float(np.hypot(*float32_floor(points).max(axis=0)))
+    reach = 2.0 * float(np.hypot(*floor.max(axis=0)))
     # A segment, or a sliver whose sense of turning is left to the rounding.
     ends = points[hull[0]], points[hull[int(np.argmax(np.hypot(*(points[hull] - points[hull[0]]).T)))]]
     if len(hull) <= 2 or (_distance_to_segment(points, *ends) <= reach).all():
@@ -134,33 +131,36 @@ class PolygonTracks:
     """Motion of every polygon from its last two instances."""
 
     def __init__(self) -> None:
-        self._last: dict[str, tuple[int, FloatArray]] = {}
+        self._last: dict[str, tuple[int, FloatArray, FloatArray]] = {}
 
     def clear(self) -> None:
         """Forget everything."""
         self._last.clear()
 
-    def update(self, name: str, points: FloatArray, stamp_ns: int) -> Motion:
-        """Take in an instance, (n, 2) points at a time [ns].
+    def update(self, name: str, points: FloatArray, floor: FloatArray, stamp_ns: int) -> Motion:
+        """Take in an instance, (n, 2) points, each coordinate good to its floor, at a time [ns].
 
         A stamp that does not grow tells nothing about motion: the polygon counts as being at rest, as the first one
         does.
         """
         before = self._last.get(name)
-        self._last[name] = (stamp_ns, points)
+        self._last[name] = (stamp_ns, points, floor)
         if before is None or stamp_ns <= before[0]:
             return Motion()
-        return displacement(before[1], points, (stamp_ns - before[0]) * 1e-9)
+        if before[1].shape != points.shape:
+            return Motion(fault=f"{NO_TRANSLATION}: {len(before[1])} points became {len(points)}")
+        return displacement(before[1], points, before[2] + floor, (stamp_ns - before[0]) * 1e-9)
 
 
-def displacement(before: FloatArray, after: FloatArray, seconds: float) -> Motion:
-    """The translation that takes one ring to the other, vertex by vertex, up to the floor of both."""
-    if before.shape != after.shape:
-        return Motion(fault=f"the motion is not a translation: {len(before)} points became {len(after)}")
+NO_TRANSLATION = "the motion is not a translation"
+
+
+def displacement(before: FloatArray, after: FloatArray, slack: FloatArray, seconds: float) -> Motion:
+    """The translation that takes one ring to the other, vertex by vertex, each coordinate up to its slack."""
     # Vertex i moved by a number in [lower_i, upper_i]; a translation lies in all of these intervals.
-    moved, slack = after - before, float32_floor(before) + float32_floor(after)
+    moved = after - before
     lower, upper = (moved - slack).max(axis=0), (moved + slack).min(axis=0)
     if (lower > upper).any():
-        return Motion(fault="the motion is not a translation")
+        return Motion(fault=NO_TRANSLATION)
     x, y = (0.5 * (lower + upper) / seconds).tolist()
     return Motion((x, y), float(np.hypot(*(0.5 * (upper - lower)))) / seconds)
