@@ -3,6 +3,10 @@ BIN := .venv/bin
 CPP := $(wildcard src/*/*.cpp)
 HPP := $(wildcard src/*/*.hpp)
 
+# The ROS wheels set this once they have found their libraries; inherited from another environment it
+# would keep them from finding those of .venv.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
 .PHONY: help build test soak demo bench lint format colcon clean
 
 help:  ## list the targets
