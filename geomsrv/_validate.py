@@ -55,9 +55,7 @@ def floats(
         raise GeometryError(f"{name} must hold real numbers, got dtype {given.dtype}")
     if given.dtype.itemsize > 8:
         raise GeometryError(f"{name} must be representable in float64, got dtype {given.dtype}")
-    if given.ndim != len(shape) or any(
-        want not in (None, got) for want, got in zip(shape, given.shape, strict=True)
-    ):
+    if given.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, given.shape, strict=True)):
         wanted = f"have shape {shape_text(shape)}" if shape else "be a single number"
         raise GeometryError(f"{name} must {wanted}, got shape {given.shape}")
     numbers = np.asarray(given, dtype=np.float64, order="C")
@@ -120,8 +118,7 @@ def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.flo
         i = int(np.argmax(bad))
         item = f"[{i}]" if rows.ndim == 3 else ""
         raise GeometryError(
-            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} "
-            f"(at most {MAX_AXES_DEFECT:g})"
+            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} (at most {MAX_AXES_DEFECT:g})"
         )
     return rows
 

@@ -214,14 +214,18 @@ def first_contact(
     if isinstance(a, Polytopes):
         nothing = np.full(count, np.nan)
         return FirstContacts(
-            np.full(count, ContactStatus.UNSUPPORTED, np.uint8), nothing, nothing.copy(), nothing.copy(),
-            nothing.copy(), np.full((count, d), np.nan), np.zeros((0, d)), np.zeros(count + 1, np.int64),
+            np.full(count, ContactStatus.UNSUPPORTED, np.uint8),
+            nothing,
+            nothing.copy(),
+            nothing.copy(),
+            nothing.copy(),
+            np.full((count, d), np.nan),
+            np.zeros((0, d)),
+            np.zeros(count + 1, np.int64),
             Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
             "first contact of polytopes is unsupported in this version",
         )
-    answer = _core.first_contact_polygons(
-        a.vertices, a.offsets, b.vertices, b.offsets, *moving, end, bool(contact_set)
-    )
+    answer = _core.first_contact_polygons(a.vertices, a.offsets, b.vertices, b.offsets, *moving, end, bool(contact_set))
     return FirstContacts(*answer, Cost(time.perf_counter_ns() - start, tier, {"filter": count}))
 
 
@@ -346,9 +350,7 @@ def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:
     if isinstance(a, Polygons):
         return _core.distance_polygons(a.vertices, a.offsets, b.vertices, b.offsets, penetration)
     if isinstance(a, Boxes) and isinstance(b, Boxes):
-        return _core.distance_boxes(
-            a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration
-        )
+        return _core.distance_boxes(a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration)
     if isinstance(a, Boxes):
         return _core.distance_boxes_polytopes(a.center, a.axes, a.half_extents, *_hulls(b), penetration)
     if isinstance(b, Boxes):

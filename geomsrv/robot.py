@@ -76,9 +76,7 @@ class Robot:
                 id=prefix + (name if len(link.collisions) == 1 else f"{name}/{i}"),
                 link=name,
                 shape=self._shape(name, collision.geometry),
-                X_link_shape=np.eye(4)
-                if collision.origin is None
-                else np.asarray(collision.origin, np.float64),
+                X_link_shape=np.eye(4) if collision.origin is None else np.asarray(collision.origin, np.float64),
             )
             for name, link in self._model.link_map.items()
             for i, collision in enumerate(link.collisions)
@@ -112,9 +110,7 @@ class Robot:
         """
         unknown = set(joints) - set(self.joint_names)
         if unknown:
-            raise GeometryError(
-                f"joints: unknown joint {min(unknown)!r}; the robot has {', '.join(self.joint_names)}"
-            )
+            raise GeometryError(f"joints: unknown joint {min(unknown)!r}; the robot has {', '.join(self.joint_names)}")
         self._model.update_cfg({name: float(joints.get(name, 0.0)) for name in self.joint_names})
         root = np.eye(4) if base is None else np.asarray(base, np.float64)
         return [
@@ -156,9 +152,7 @@ class Robot:
             if not Path(srdf).is_file():
                 raise GeometryError(f"srdf: no such file: {srdf}")
             for entry in ElementTree.parse(srdf).getroot().iter("disable_collisions"):
-                pairs.update(
-                    product(by_link.get(entry.get("link1", ""), ()), by_link.get(entry.get("link2", ""), ()))
-                )
+                pairs.update(product(by_link.get(entry.get("link1", ""), ()), by_link.get(entry.get("link2", ""), ())))
         return sorted((min(pair), max(pair)) for pair in pairs)
 
 

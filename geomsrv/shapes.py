@@ -432,9 +432,7 @@ class _Ragged:
         """Batch of the vertex arrays listed in `items`, one (k, d) array each."""
         if not isinstance(items, Iterable):
             raise GeometryError(f"items must be a list of vertex arrays, got {type(items).__name__}")
-        arrays = [
-            _validate.floats(item, f"items[{i}]", (None, cls.dimension)) for i, item in enumerate(items)
-        ]
+        arrays = [_validate.floats(item, f"items[{i}]", (None, cls.dimension)) for i, item in enumerate(items)]
         ends = np.cumsum([0, *(len(array) for array in arrays)], dtype=np.int64)
         return cls(np.concatenate([np.zeros((0, cls.dimension)), *arrays]), ends)  # type: ignore[call-arg]
 
@@ -645,9 +643,7 @@ class Mesh(Shape):
         wrong = (faces < 0) | (faces >= len(points))
         if wrong.any():
             i = int(np.argmax(wrong.any(axis=1)))
-            raise GeometryError(
-                f"triangles[{i}] refers to a vertex outside 0..{len(points) - 1}: {faces[i].tolist()}"
-            )
+            raise GeometryError(f"triangles[{i}] refers to a vertex outside 0..{len(points) - 1}: {faces[i].tolist()}")
         _freeze(self, vertices=points, triangles=faces.astype(np.int64))
 
 

@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts the node with the parameters of config/geomsrv.yaml, or of another file.
 
-    ros2 launch geomsrv geomsrv.launch.py params_file:=mine.yaml
+ros2 launch geomsrv geomsrv.launch.py params_file:=mine.yaml
 """
 
 from pathlib import Path
 
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
+
+from launch import LaunchDescription
 
 DEFAULT_PARAMETERS = Path(__file__).resolve().parent.parent / "config" / "geomsrv.yaml"
 

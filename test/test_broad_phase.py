@@ -70,9 +70,7 @@ def test_pairs_are_those_of_brute_force(name, n):
     np.testing.assert_array_equal(pairs, wanted)
     if n == 500:
         assert len(wanted) > 10, "the scenario must hold overlapping boxes"
-        assert len(wanted) < n * (n - 1) / 4 or name in ("all overlap", "one place"), (
-            "and some that are apart"
-        )
+        assert len(wanted) < n * (n - 1) / 4 or name in ("all overlap", "one place"), "and some that are apart"
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
