@@ -6,6 +6,7 @@ Importable without ROS.  Everything public is re-exported here; see `geomsrv.que
 `geomsrv.shapes` for the inputs, `geomsrv.answers` for the outputs, `geomsrv.scene` for worlds of named shapes.
 """
 
+from geomsrv._version import __version__
 from geomsrv.answers import (
     Booleans,
     ContactStatus,

@@ -61,7 +61,7 @@ class DistanceStatus(IntEnum):
 
 
 # Names are [NEAR|FAR]_[LEFT|RIGHT]_[UP|DOWN], the faces that meet in the feature; LEFT is the +L side, UP the +U side.
-FrustumRegion = IntEnum(
+FrustumRegion = IntEnum(  # type: ignore[misc]  # mypy wants literal members
     "FrustumRegion",
     {
         "_".join(part for part in (depth, side, height) if part) or "INSIDE": 9 * k + 3 * j + i

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -144,7 +144,7 @@ def distance_to_frustum(
         status=np.zeros(len(array), np.uint8),
         cost=Cost(time.perf_counter_ns() - start, tier, {"filter": len(array)}),
         region=region,
-        _point_a=point_a if point_a is not None else lambda: kernel(packed, array, True)[4],
+        _point_a=point_a if point_a is not None else lambda: cast(FloatArray, kernel(packed, array, True)[4]),
     )
 
 
@@ -205,7 +205,9 @@ def first_contact(
     _expect(b, type(a), "b")
     count = _common_length(len(a), len(b))
     d = a.dimension
-    moving = [_velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))]
+    moving_a, moving_b = (
+        _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
+    )
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
@@ -225,7 +227,9 @@ def first_contact(
             Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
             "first contact of polytopes is unsupported in this version",
         )
-    answer = _core.first_contact_polygons(a.vertices, a.offsets, b.vertices, b.offsets, *moving, end, bool(contact_set))
+    answer = _core.first_contact_polygons(
+        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set)
+    )
     return FirstContacts(*answer, Cost(time.perf_counter_ns() - start, tier, {"filter": count}))
 
 

@@ -121,7 +121,7 @@ def set_twist(twist: Any, row: ArrayLike) -> None:
 def points_in(frame_pose: ArrayLike, points: FloatArray) -> FloatArray:
     """Points (n, 3) given in a frame, expressed in the frame that `frame_pose` (7,) is given in."""
     frame = _validate.poses(frame_pose, "transform")
-    return points @ _validate.rotation_matrices(frame[:, 3:])[0].T + frame[0, :3]
+    return np.asarray(points @ _validate.rotation_matrices(frame[:, 3:])[0].T + frame[0, :3])
 
 
 def states_in(
