@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import hard_cases, reproducer
 from oracle import polygon as exact
+from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, slender_pair
 
 import geomsrv as gs
 
@@ -22,16 +23,11 @@ STATUS = {
     "TOUCHING": gs.TOUCHING,
     "OVERLAPPING": gs.OVERLAPPING,
 }
-SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
 # What float64 decides about a time is good to this relative error: gap and rate to 2^-46 each, or better (kSharp).
 TIME_ERROR = 2.0**-44
 # Contact sets are told apart down to this part of the scene (kLargestSlack): what is shorter may be one point.
 LARGEST_SLACK = 2.0**-42
-
-
-def polygons(*rings):
-    return gs.Polygons.from_list([np.asarray(ring, float).reshape(-1, 2) for ring in rings])
 
 
 def contact(a, b, velocity_a=(0.0, 0.0), velocity_b=(0.0, 0.0), **options):
@@ -115,10 +111,6 @@ def test_hard_cases_are_all_there():
 
 
 # ---------------------------------------------------------------------------------------- constructed answers
-
-
-def shifted(ring, dx, dy):
-    return [(x + dx, y + dy) for x, y in ring]
 
 
 CONSTRUCTED = {
@@ -273,13 +265,6 @@ def test_grazing_approach_keeps_its_digits(slope):
 # ----------------------------------------------------------------------------------------------------- oracle
 
 
-def random_ring(rng, size):
-    """Integer ring as a hull, now and then a point or a segment."""
-    count = int(rng.integers(1, 3)) if rng.random() < 0.15 else int(rng.integers(3, 9))
-    points = [tuple(int(c) for c in p) for p in rng.integers(-size, size + 1, (count, 2))]
-    return [tuple(int(c) for c in p) for p in exact.hull(points)]
-
-
 def random_pairs(rng, count, size):
     """Integer pairs, most of them aimed at each other."""
     pairs = []
@@ -311,22 +296,7 @@ def slides(a, velocity_a, b, velocity_b):
     return ray != (0, 0) and any(d == 0 and n[0] * ray[0] + n[1] * ray[1] == 0 for n, d in exact.constraints(ring))
 
 
-class Turn:
-    """Rotation and shift in float64."""
-
-    def __init__(self, rng, shift):
-        angle = rng.uniform(0.0, 2.0 * math.pi)
-        self.cos, self.sin = math.cos(angle), math.sin(angle)
-        self.shift = rng.uniform(-shift, shift, 2)
-
-    def vector(self, v):
-        return np.array([self.cos * v[0] - self.sin * v[1], self.sin * v[0] + self.cos * v[1]])
-
-    def ring(self, ring):
-        return np.array([self.vector(p) for p in ring]).reshape(-1, 2) + self.shift
-
-
-@pytest.mark.parametrize(("size", "shift", "count"), [(2, 10.0, 700), (4, 10.0, 500), (12, 100.0, 250), (3, 1e3, 250)])
+@pytest.mark.parametrize(("size", "shift", "count"), [(2, 10.0, 500), (4, 10.0, 400), (12, 100.0, 200), (3, 1e3, 200)])
 def test_against_the_oracle(rng, size, shift, count):
     """Integer pairs and rotated float64 copies of them: the same outcome, times and contact sets.
 
@@ -377,7 +347,7 @@ def test_against_the_oracle(rng, size, shift, count):
             reached[truth.status] += 1
             reached["degenerate"] += min(len(pairs[i][0]), len(pairs[i][2])) < 3
     assert reached["WILL_TOUCH"] >= 0.5 * count and reached["OVERLAPPING"] >= 0.1 * count
-    assert min(reached[k] for k in ("V-V", "V-E", "E-E", "TOUCHING", "degenerate")) >= 10, reached
+    assert min(reached[k] for k in ("V-V", "V-E", "E-E", "TOUCHING", "degenerate")) >= 4, reached
     assert size > 4 or min(reached["grazing"], reached["sliding"]) >= 3, reached
 
 
@@ -616,6 +586,61 @@ def test_far_from_the_origin(rng):
         if abs(float(truth.separation_sq)) > margin**2 and (truth.hits and truth.last_time > truth.time):
             assert answer.status[0] == STATUS[truth.status], given
             assert Fraction(answer.time_lower[0]) <= truth.time <= Fraction(answer.time_upper[0]), given
+
+
+def test_slender_polygons(rng):
+    """Slivers, needles and nearly parallel edges: nothing is missed, and no hit is further off than the slack."""
+    reached = Counter()
+    for _ in range(300):
+        a, b, along = slender_pair(rng)
+        apart = np.mean(a, axis=0) - np.mean(b, axis=0)
+        velocity = rng.choice([1.0, -1.0]) * along
+        if rng.random() < 0.7:
+            velocity = apart * rng.uniform(0.1, 2.0) + rng.normal(size=2) * 10.0 ** -rng.integers(0, 16)
+        if rng.random() < 0.5:
+            b = hull(np.array(b) - rng.uniform(0, 3) * velocity)
+        velocity = tuple(map(float, velocity))
+        t_max = INF if rng.random() < 0.7 else float(rng.uniform(0, 3))
+        answer = contact(a, b, (0, 0), velocity, t_max=t_max)
+        truth = exact.first_contact(a, (0, 0), b, velocity, t_max)
+        given = reproducer(a=a, b=b, velocity=velocity, t_max=t_max)
+        status, expected = answer.status[0], STATUS[truth.status]
+        reached[truth.status] += 1
+        if status == gs.NEVER:
+            assert expected == gs.NEVER, given
+            continue
+        lower, time, upper, last = (
+            float(x[0]) for x in (answer.time_lower, answer.time, answer.time_upper, answer.last_time)
+        )
+        assert 0.0 <= lower <= time <= upper <= t_max and time <= last <= t_max, given
+        assert len(answer.points) > 0 and np.isfinite(answer.points).all(), given
+        reach = np.abs(np.array(a + b) - a[0]).max()
+        slack = Fraction(2.0**-41 * reach) ** 2
+        if expected == gs.NEVER:
+            speed = np.abs(velocity).max()
+            passed = Fraction(min(t_max, 6.0 * reach / speed) if speed > 0 else 0.0)
+            swept = b + [(x + passed * Fraction(velocity[0]), y + passed * Fraction(velocity[1])) for x, y in
+                         ((Fraction(x), Fraction(y)) for x, y in b)]  # fmt: skip
+            assert exact.separation(a, swept).signed_square <= slack, given
+            reached["within the slack"] += 1
+        elif status != expected:
+            assert abs(truth.separation_sq) <= slack or {status, expected} == {gs.TOUCHING, gs.OVERLAPPING}, given
+        else:
+            assert Fraction(lower) <= truth.time <= Fraction(upper), given
+            if status == gs.WILL_TOUCH and len(answer.points) == len(truth.contact):
+                corners = [[float(c) for c in p] for p in truth.contact]
+                assert set_distance(answer.points, corners) <= 1e-11 * reach, given
+    assert min(reached[k] for k in (*STATUS, "within the slack")) >= 10, reached
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-6, 1e-9, 1e-12, 0.0])
+def test_needles_meet_tip_to_tip(width):
+    """However thin they are: the edges around the tips see neither gap nor speed any more, the tips still do."""
+    a = [(0.0, 0.0), (1e6, -width), (1e6, width)][: 3 if width else 2]
+    answer = contact(a, [(-2.0 - x, -y) for x, y in a], (0, 0), (1.0, 0.0))
+    assert answer.status[0] == gs.WILL_TOUCH
+    assert answer.time[0] == 2.0 and answer.time_lower[0] <= 2.0 <= answer.time_upper[0]
+    assert set_distance(answer.points, [(0.0, 0.0)]) == 0.0
 
 
 def test_misses_beyond_the_tip_of_a_needle_are_seen():

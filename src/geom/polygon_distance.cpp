@@ -100,7 +100,7 @@ Candidate evaluate(const PolygonPair& pair, AxisOf axis, const ExactVec2& direct
     const PairedPolygon& p = pair.side(axis.side);
     const Vec2 to = pair.other(axis.side).ring[vertex];
     const std::size_t start = p.base(axis.index);
-    Candidate found{axis, vertex, start, false, {}, 0.0};
+    Candidate found{axis, vertex, start, false, {kInfinity, 0.0}, 0.0};
     if (axis.index < p.edges) {
         const Vec2 from = p.ring[start];
         const Vec2 end = p.ring[p.next(start)];

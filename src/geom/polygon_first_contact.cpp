@@ -324,43 +324,62 @@ struct Entry {
     AxisOf axis;
 };
 
+/// When contact along one axis begins; not if the axis' gap is closed, in exact arithmetic, from the start.
+struct Closing {
+    Timed time;
+    bool open = true;
+    bool sliding = false;  ///< within the slack it is closed and stays so
+};
+
+Closing closing_of(const PolygonPair& pair, AxisOf axis, const Motion& motion, const Slacks& slacks,
+                   bool alone) {
+    const LiteralAxis at = literal(pair, axis, motion, slacks);
+    if (alone && at.is_sharp() && at.gap > 0.0 && at.rate > 0.0) {
+        return {closing_time({{at.gap, 0.0}, at.gap_error}, {{at.rate, 0.0}, at.rate_error})};
+    }
+    // Near contact, or grazing, most digits of the gap or of the rate cancel.  Of several axes the one that
+    // closes last has to be found: two nearly parallel edges meet the other polygon at almost the same time,
+    // but in different places.
+    const ExactVec2 direction = pair.exact_axis(axis);
+    const std::size_t vertex = pair.lowest(axis);
+    const Enclosed gap = pair.enclosed_gap(axis, direction, vertex);
+    const bool open =
+        std::fabs(gap.value.hi) > gap.error ? gap.value.hi > 0.0 : pair.sign_of_gap(axis, vertex) > 0;
+    if (!open) {
+        return {{}, false};
+    }
+    const AxisNumbers<double> slack = numbers(pair, axis, motion, slacks);
+    const bool sliding = slack.gap <= slack.gap_slack && slack.rate <= slack.rate_slack;
+    return {closing_time(gap, enclosed_rate(axis, direction, motion)), true, sliding};
+}
+
 /// The axis along which contact begins last, and when, for the given numbers as they are.
 ///
 /// Axes along which the polygons slide within the slack do not set the time, but they do widen the upper
-/// bound: in exact arithmetic contact may begin only when such a tiny gap closes.
+/// bound: in exact arithmetic contact may begin only when such a tiny gap closes.  The tip of a polygon with
+/// area sets it only where all edges around it slide like that.
 Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& slacks,
                    std::span<const AxisOf> axes) {
     Entry entry;
-    for (const AxisOf axis : axes) {
-        if (pair.side(axis.side).is_redundant(axis.index)) {
-            continue;
-        }
-        const LiteralAxis at = literal(pair, axis, motion, slacks);
-        Timed close;
-        if (at.is_sharp() && at.gap > 0.0 && at.rate > 0.0) {
-            close = closing_time({{at.gap, 0.0}, at.gap_error}, {{at.rate, 0.0}, at.rate_error});
-        } else {
-            // Near contact, or grazing: most digits of the gap or of the rate cancel.
-            const ExactVec2 direction = pair.exact_axis(axis);
-            const std::size_t vertex = pair.lowest(axis);
-            const Enclosed gap = pair.enclosed_gap(axis, direction, vertex);
-            const bool open = gap.value.hi > gap.error;
-            if (!open && (-gap.value.hi > gap.error || pair.sign_of_gap(axis, vertex) <= 0)) {
+    for (const bool redundant : {false, true}) {
+        for (const AxisOf axis : axes) {
+            if (pair.side(axis.side).is_redundant(axis.index) != redundant) {
                 continue;
             }
-            close = closing_time(gap, enclosed_rate(axis, direction, motion));
-            entry.upper = std::max(entry.upper, close.upper);
-            const AxisNumbers<double> slack = numbers(pair, axis, motion, slacks);
-            const bool sliding = slack.gap <= slack.gap_slack && slack.rate <= slack.rate_slack;
-            if (sliding) {
+            const Closing closing = closing_of(pair, axis, motion, slacks, axes.size() == 1);
+            if (!closing.open) {
                 continue;
             }
-        }
-        entry.lower = std::max(entry.lower, close.lower);
-        entry.upper = std::max(entry.upper, close.upper);
-        if (entry.time < close.nominal) {
-            entry.time = close.nominal;
-            entry.axis = axis;
+            const Timed& time = closing.time;
+            entry.upper = std::max(entry.upper, redundant ? 0.0 : time.upper);
+            if (closing.sliding || (redundant && !(entry.time.hi < time.lower))) {
+                continue;
+            }
+            entry.lower = std::max(entry.lower, time.lower);
+            if (entry.time < time.nominal) {
+                entry.time = time.nominal;
+                entry.axis = axis;
+            }
         }
     }
     return entry;
@@ -369,19 +388,25 @@ Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& 
 /// When they part.
 double earliest_exit(const PolygonPair& pair, const Motion& motion, const Slacks& slacks,
                      std::span<const AxisOf> axes) {
+    // What rounding may leave between a tip and the edges beside it: two sharp times.
+    constexpr double kSameTime = 4.0 * kSharp;
     double exit = kInfinity;
-    for (const AxisOf axis : axes) {
-        if (pair.side(axis.side).is_redundant(axis.index)) {
-            continue;
+    for (const bool redundant : {false, true}) {
+        for (const AxisOf axis : axes) {
+            if (pair.side(axis.side).is_redundant(axis.index) != redundant) {
+                continue;
+            }
+            const LiteralAxis at = literal(pair, axis, motion, slacks);
+            double time = at.gap / at.rate;
+            if (!at.is_sharp()) {
+                const ExactVec2 direction = pair.exact_axis(axis);
+                const Enclosed gap = pair.enclosed_gap(axis, direction, pair.lowest(axis));
+                time = quotient(gap.value, enclosed_rate(axis, direction, motion).value).hi;
+            }
+            if (!redundant || time < (1.0 - kSameTime) * exit) {
+                exit = std::min(exit, time);
+            }
         }
-        const LiteralAxis at = literal(pair, axis, motion, slacks);
-        double time = at.gap / at.rate;
-        if (!at.is_sharp()) {
-            const ExactVec2 direction = pair.exact_axis(axis);
-            const Enclosed gap = pair.enclosed_gap(axis, direction, pair.lowest(axis));
-            time = quotient(gap.value, enclosed_rate(axis, direction, motion).value).hi;
-        }
-        exit = std::min(exit, time);
     }
     return std::max(exit, 0.0);
 }
@@ -418,12 +443,21 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
     const auto mark = [&](int side, std::size_t vertex) -> Mark {
         return {side, vertex, dot(along, pair.side(side).local(vertex)) + (side == 1 ? moment * drift : 0.0)};
     };
-    // Ends in order along the line: the two edges of a segment lie on each other, so its chain may run either
-    // way.
+    // The outermost of a chain: its ends, unless it runs there and back as in a segment or a sliver.
     const auto ends = [&](int side, Chain chain) {
-        const Mark first = mark(side, chain.first);
-        const Mark last = mark(side, chain.last);
-        return first.place <= last.place ? std::pair{first, last} : std::pair{last, first};
+        Mark least = mark(side, chain.first);
+        Mark most = least;
+        for (std::size_t vertex = chain.first; vertex != chain.last;) {
+            vertex = pair.side(side).next(vertex);
+            const Mark next = mark(side, vertex);
+            if (next.place < least.place) {
+                least = next;
+            }
+            if (next.place > most.place) {
+                most = next;
+            }
+        }
+        return std::pair{least, most};
     };
     const auto [own_low, own_high] = ends(axis.side, pair.highest(axis, slacks.heights()));
     const auto [other_low, other_high] =
@@ -544,7 +578,9 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     }
     if (window.deep) {
         result.points = overlap_.of(pair_, slacks.heights());
-        return result;
+        if (!result.points.empty()) {
+            return result;
+        }
     }
     const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
     const auto moved = [&](const Mark& mark) {

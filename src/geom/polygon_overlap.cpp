@@ -40,6 +40,11 @@ double height(Vec2 p, Vec2 q, Vec2 v, double tolerance) {
     return std::fabs(cross((1.0 / length) * base, v - p));
 }
 
+/// Vertices that are nearer to each other than this, scaled, are one: both may be off by as much as an axis.
+double merging_distance(const PolygonPair& pair, Slack slack) {
+    return 2.0 * (pair.gap_error() + std::min(2.0 * slack.noise, slack.limit));
+}
+
 }  // namespace
 
 void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack slack) {
@@ -57,7 +62,7 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
         double leave = 1.0;
         std::size_t enter_axis = 0;
         std::size_t leave_axis = 0;
-        for (std::size_t k = 0; k < q.axes && enter <= leave; ++k) {
+        for (std::size_t k = 0; k < q.axes && leave >= 0.0; ++k) {
             const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
             const double level = pair.gap_error() * size + kPairUnderflow +
                                  std::min(slack.noise * (size + pair.reach()), slack.limit * size);
@@ -74,6 +79,11 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             }
         }
         if (enter > leave) {
+            // Across a sliver, rounding may exchange the two crossings.
+            const double length = std::hypot(p.x[end] - p.x[i], p.y[end] - p.y[i]);
+            if (leave >= 0.0 && enter <= 1.0 && (enter - leave) * length <= merging_distance(pair, slack)) {
+                found_.push_back(crossing(pair, side, i, {1 - side, enter_axis}));
+            }
             continue;
         }
         // The end of a whole edge is the start of the next one.
@@ -104,8 +114,7 @@ std::span<const Vec2> PolygonOverlap::of(const PolygonPair& pair, Slack slack) {
 
     // Where the polygons share a line, or cross in a vertex, rounding leaves vertices that are not there in
     // truth.
-    const double tolerance = std::scalbn(2.0 * (pair.gap_error() + std::min(2.0 * slack.noise, slack.limit)),
-                                         -pair.scale_exponent());
+    const double tolerance = std::scalbn(merging_distance(pair, slack), -pair.scale_exponent());
     merged_.assign(hull.begin(), hull.end());
     for (std::size_t i = 0; merged_.size() > 1 && i < merged_.size();) {
         const std::size_t n = merged_.size();
