@@ -8,6 +8,7 @@ Nothing below this line checks its input again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -27,6 +28,9 @@ MAX_AXES_DEFECT = 1e-2
 
 # Quaternions are normalised; a norm further from 1 than float32 drift allows is a mistake, not drift.
 MAX_QUATERNION_DEFECT = 1e-3
+
+# So few items are looked at faster one by one than by numpy, whose every call costs as much as some ten of them.
+ONE_BY_ONE = 4
 
 
 def shape_text(shape: tuple[int | None, ...]) -> str:
@@ -50,7 +54,7 @@ def floats(
     value: Any, name: str, shape: tuple[int | None, ...], *, allow_infinite: bool = False
 ) -> NDArray[np.float64]:
     """`value` as finite C-contiguous float64 of the given shape (None: any size)."""
-    given = array(value, name)
+    given = value if type(value) is np.ndarray else array(value, name)
     if given.dtype.kind not in "fiu":
         raise GeometryError(f"{name} must hold real numbers, got dtype {given.dtype}")
     if given.dtype.itemsize > 8:
@@ -77,7 +81,8 @@ def _where(array: NDArray[Any], flat_index: int) -> str:
 
 def scalar(value: Any, name: str, *, positive: bool = False, minimum: float | None = None) -> float:
     """One finite number."""
-    number = float(floats(value, name, ()))
+    plain = type(value) is float and math.isfinite(value)
+    number = value if plain else float(floats(value, name, ()))
     if positive and not number > 0.0:
         raise GeometryError(f"{name} must be > 0, got {number}")
     if minimum is not None and number < minimum:
@@ -110,6 +115,8 @@ def offsets(value: Any, name: str, total: int, minimum_count: int) -> NDArray[np
 def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Unit, mutually perpendicular rows, taken literally up to `MAX_AXES_DEFECT`; either handedness."""
     rows = floats(value, name, shape)
+    if rows.size <= ONE_BY_ONE * 9 and all(map(_orthonormal, rows.reshape(-1, *rows.shape[-2:]).tolist())):
+        return rows
     with np.errstate(over="ignore", invalid="ignore"):  # huge entries give inf and nan, refused below
         gram = rows @ np.swapaxes(rows, -1, -2)
         defect = np.abs(gram - np.eye(rows.shape[-1])).max(axis=(-1, -2), initial=0.0)
@@ -123,10 +130,25 @@ def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.flo
     return rows
 
 
+def _orthonormal(rows: list[list[float]]) -> bool:
+    """What `axes` asks of one item."""
+    for i, a in enumerate(rows):
+        for j, b in enumerate(rows[: i + 1]):
+            if not abs(math.sumprod(a, b) - (i == j)) <= MAX_AXES_DEFECT:
+                return False
+    return True
+
+
 def poses(value: Any, name: str = "poses") -> NDArray[np.float64]:
     """(n, 7) or (7,) rows x y z qx qy qz qw -> (n, 7) with unit quaternions."""
     given = array(value, name)
     rows = floats(given, name, (7,) if given.ndim == 1 else (None, 7)).reshape(-1, 7)
+    if len(rows) <= ONE_BY_ONE:
+        norms = [math.sqrt(x * x + y * y + z * z + w * w) for x, y, z, w in rows[:, 3:].tolist()]
+        if all(abs(length - 1.0) <= MAX_QUATERNION_DEFECT for length in norms):
+            placed = rows.copy()
+            placed[:, 3:] /= np.array(norms)[:, None]
+            return placed
     with np.errstate(over="ignore"):  # huge entries give inf, refused below
         norm = np.linalg.norm(rows[:, 3:], axis=1)
     bad = ~(np.abs(norm - 1.0) <= MAX_QUATERNION_DEFECT)
