@@ -37,7 +37,8 @@ struct Output {
     T* data = nullptr;
 };
 
-/// numpy.empty: large results get huge pages from numpy's allocator, which halves the page faults of a big batch.
+/// numpy.empty: large results get huge pages from numpy's allocator, which halves the page faults of a big
+/// batch.
 template <class T>
 Output<T> empty(std::initializer_list<std::size_t> shape) {
     static_assert(sizeof(T) == 1 || sizeof(T) == 8);

@@ -13,7 +13,8 @@ namespace {
 
 /// Index of the first NaN or infinity, or -1.
 std::int64_t first_nonfinite(const double* values, std::size_t count) {
-    // All exponent bits set means infinity or NaN.  Whole blocks are tested without a branch, so the loop vectorises.
+    // All exponent bits set means infinity or NaN.  Whole blocks are tested without a branch, so the loop
+    // vectorises.
     constexpr std::uint64_t kExponent = 0x7ff0'0000'0000'0000;
     constexpr std::size_t kBlock = 1024;
     for (std::size_t begin = 0; begin < count; begin += kBlock) {

@@ -44,9 +44,13 @@ struct Mat3 {
     Vec3 row[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
 };
 
-constexpr Vec3 operator*(const Mat3& m, Vec3 v) { return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)}; }
+constexpr Vec3 operator*(const Mat3& m, Vec3 v) {
+    return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)};
+}
 /// Product with the transpose; the inverse where m is a rotation.
-constexpr Vec3 transposed_times(const Mat3& m, Vec3 v) { return v.x * m.row[0] + v.y * m.row[1] + v.z * m.row[2]; }
+constexpr Vec3 transposed_times(const Mat3& m, Vec3 v) {
+    return v.x * m.row[0] + v.y * m.row[1] + v.z * m.row[2];
+}
 
 /// X_ab: pose of b in a.  A point p_b given in b has coordinates rotation * p_b + translation in a.
 struct Transform {
