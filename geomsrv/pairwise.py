@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -39,6 +40,8 @@ __all__ = [
     "listed_first_contacts",
     "world_of",
 ]
+
+_NONE = np.zeros(0, dtype=bool)
 
 NOT_COMPARED = "polygons are compared with polygons only"
 
@@ -119,36 +122,45 @@ def world_of(*sides: Bodies) -> World:
     GeometryError
         Names the list, the index and the fault.
     """
-    counts = [len(side.shapes) for side in sides]
     poses = _checked(sides, "poses", [side.poses for side in sides], _validate.poses)
+    model = _resting(tuple(shape for side in sides for shape in side.shapes))
+    twists = model.twists
     if any(len(side.twists) for side in sides):
-        whole = [
-            side.twists if len(side.twists) else np.zeros((count, 6)) for side, count in zip(sides, counts, strict=True)
-        ]
+        whole = [side.twists if len(side.twists) else np.zeros((len(side.shapes), 6)) for side in sides]
         twists = _checked(sides, "twists", whole, lambda rows, name: _validate.floats(rows, name, (None, 6)))
-    else:
-        twists = np.zeros((sum(counts), 6))
-    table = _table(tuple(shape for side in sides for shape in side.shapes))
-    if table.planar.any():
-        poses, faults = laid_flat(poses, twists, table.planar)
+    if model.planar.any():
+        poses, faults = laid_flat(poses, twists, model.planar)
         for row, text in faults.items():
-            k = int(np.searchsorted(np.cumsum(counts), row, side="right"))
-            raise GeometryError(f"poses{sides[k].suffix}[{row - sum(counts[:k])}]: {text}")
-    ids = tuple(map(str, range(len(poses))))
-    return World(
+            for side in sides:
+                if row < len(side.shapes):
+                    raise GeometryError(f"poses{side.suffix}[{row}]: {text}")
+                row -= len(side.shapes)
+    world = copy(model)
+    world.__dict__.update(poses=poses, twists=twists)
+    return world
+
+
+@lru_cache(maxsize=128)
+def _resting(shapes: tuple[Shape | Frustum, ...]) -> World:
+    """Shapes at rest in the origin: what can be kept of them, as a client asks about the same again and again."""
+    count = len(shapes)
+    ids = tuple(map(str, range(count)))
+    world = World(
         ids=ids,
-        index=dict(zip(ids, range(len(ids)), strict=True)),
-        table=table,
-        shape=np.arange(len(ids)),
-        uncertainty=np.zeros(len(ids)),
-        velocity_uncertainty=np.zeros(len(ids)),
+        index={name: row for row, name in enumerate(ids)},
+        table=ShapeTable.of(shapes),
+        shape=np.arange(count),
+        uncertainty=np.zeros(count),
+        velocity_uncertainty=np.zeros(count),
         motion_faults={},
-        poses=poses,
-        twists=twists,
+        poses=np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1)),
+        twists=np.zeros((count, 6)),
         allowed=np.zeros(0, np.int64),
         version=0,
         stamp=None,
     )
+    assert len(world.planar) == count  # found out once, for all copies
+    return world
 
 
 def _checked(
@@ -163,12 +175,6 @@ def _checked(
         raise
 
 
-@lru_cache(maxsize=128)
-def _table(shapes: tuple[Shape | Frustum, ...]) -> ShapeTable:
-    """Table of the very same shapes as before, as a client asks about them again and again."""
-    return ShapeTable.of(shapes)
-
-
 def listed_distances(
     world: World, pairs: IntArray, *, want: Sequence[str] = ("distance",), accuracy: str = "float64"
 ) -> ListedDistances:
@@ -177,8 +183,8 @@ def listed_distances(
     tier = _validate.accuracy(accuracy)
     penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
     _distinct(world, pairs)
-    planar = world.planar[pairs]
     # Most lists are all of one kind, and then no row needs to be moved.
+    planar = world.planar[pairs] if world.planar.any() else _NONE
     if not planar.any():
         rows = solid_distances(world, pairs, penetration)
     elif planar.all():

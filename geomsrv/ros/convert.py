@@ -72,7 +72,12 @@ def uint64s(values: ArrayLike) -> array.array[int]:
     return _field("Q", values, np.uint64)
 
 
+FEW = 16  # numbers are copied faster one by one
+
+
 def _field(code: str, values: ArrayLike, dtype: Any) -> array.array[Any]:
+    if isinstance(values, np.ndarray) and values.size <= FEW:
+        return array.array(code, values.ravel().tolist())
     field = array.array(code)
     field.frombytes(np.ascontiguousarray(values, dtype=dtype).reshape(-1).view(np.uint8))
     return field

@@ -398,7 +398,7 @@ class Handlers:
             ]
             world = world_of(*sides)
             count = len(sides[0].shapes)
-            a, b = np.arange(count), np.arange(count, len(world))
+            a, b = range(count), range(count, len(world))
             names = ("shapes_a", "shapes_b")
         else:
             raise GeometryError(f"select must be BY_IDS, INLINE or ALL_PAIRS, got {request.select}")
@@ -406,11 +406,14 @@ class Handlers:
             raise GeometryError(
                 f"{names[0]} and {names[1]} have {len(a)} and {len(b)} items; they must be as many, or one"
             )
+        if len(a) == 1 == len(b):
+            return world, np.array([(a[0], b[0])])
         pairs = np.empty((max(len(a), len(b)) if len(a) and len(b) else 0, 2), dtype=np.int64)
         pairs[:, 0], pairs[:, 1] = a, b
         return world, pairs
 
 
+_AT_REST = np.zeros((0, 6))
 _BY_IDS = ("ids_a", "ids_b")
 _INLINE = ("shapes_a", "poses_a", "shapes_b", "poses_b")
 
@@ -422,11 +425,12 @@ def _unused(request: Any, *names: str) -> None:
             raise GeometryError(f"{name} must be empty here")
 
 
-def _rows_of(world: World, ids: Sequence[str], name: str) -> IntArray:
-    unknown = [f"{name}[{i}] is {item!r}" for i, item in enumerate(ids) if item not in world.index]
-    if unknown:
-        raise GeometryError(f"{', '.join(unknown)}: no such object")
-    return np.array([world.index[item] for item in ids], dtype=np.int64)
+def _rows_of(world: World, ids: Sequence[str], name: str) -> Sequence[int]:
+    try:
+        return [world.index[item] for item in ids]
+    except KeyError:
+        unknown = [f"{name}[{i}] is {item!r}" for i, item in enumerate(ids) if item not in world.index]
+        raise GeometryError(f"{', '.join(unknown)}: no such object") from None
 
 
 def _bodies(shapes: Sequence[Any], poses: Any, twists: Any, suffix: str = "") -> Bodies:
@@ -437,7 +441,8 @@ def _bodies(shapes: Sequence[Any], poses: Any, twists: Any, suffix: str = "") ->
             bodies.append(convert.shape_from(item))
         except GeometryError as fault:
             raise GeometryError(f"shapes{suffix}[{i}]: {fault}") from None
-    placed, moving = convert.rows(poses, f"poses{suffix}", 7), convert.rows(twists, f"twists{suffix}", 6)
+    placed = convert.rows(poses, f"poses{suffix}", 7)
+    moving = convert.rows(twists, f"twists{suffix}", 6) if len(twists) else _AT_REST
     if len(placed) != len(bodies):
         raise GeometryError(f"shapes{suffix} are {len(bodies)}, poses{suffix} are of {len(placed)}")
     if len(moving) not in (0, len(bodies)):
@@ -510,6 +515,7 @@ def _set_first_contacts(response: Any, answer: Any, order: IntArray, want: tuple
 def _set_unsupported(response: Any, items: NDArray[np.bool_], *reasons: str, note: str = "") -> None:
     """Status and message: reasons make the answer UNSUPPORTED, and so do items without one; a note does not."""
     text = "; ".join(filter(None, (*reasons, note)))
-    unsupported = any(reasons) or items.any()
-    response.status = UNSUPPORTED if unsupported else OK
-    response.message = text or ("no kernel for some of the items" if unsupported else "")
+    if any(reasons) or items.any():
+        response.status, response.message = UNSUPPORTED, text or "no kernel for some of the items"
+    else:
+        response.message = text
