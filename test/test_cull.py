@@ -291,11 +291,13 @@ def test_needles_and_fans(left, up, rng):
         depths = near * np.array([0.5, 1.0, 3.0, 3.0, 1e3, 1e6, 2e6])
         sides = np.array([left, up]) * (depths / near)[:, None] * rng.uniform(-1.5, 1.5, (7, 2))
         middle = np.column_stack([sides, depths])
-        boxes = gs.Boxes(middle @ axes, np.tile(axes, (7, 1, 1)), np.abs(middle @ axes) * rng.uniform(0, 0.3, (7, 1)))
+        boxes = gs.Boxes(middle @ axes, np.tile(axes, (7, 1, 1)), np.abs(middle) * rng.uniform(0, 0.3, (7, 1)))
         answer, exact = check_exactly(frustum, boxes)
         # What is below 1e-300 of the largest coordinate is lost, and said to be.
         if min(left, up, near) > 1e-290 * max(left, up, near):
             assert (answer.state == exact).all()
+        if min(left, up, near) > 1e-150 * max(left, up, near):
+            assert answer.certain.all()
 
 
 # ------------------------------------------------------------------------------------------------------------ laws

@@ -504,6 +504,17 @@ def test_both_arithmetics_agree(rng):
     assert (answer.region == FrustumRegion.RIGHT).all()
 
 
+def test_neighbours_in_a_batch_change_no_bit(crowd, rng):
+    frustum, points = crowd
+    points = np.array(points[:200])
+    points[rng.random(200) < 0.3] *= 1e200  # out of range: measured one by one
+    batch = gs.distance_to_frustum(frustum, points, want=("witness",))
+    for i, point in enumerate(points):
+        single = gs.distance_to_frustum(frustum, [point], want=("witness",))
+        for name in ("distance", "lower", "upper", "region", "point_a"):
+            assert np.array_equal(getattr(single, name)[0], getattr(batch, name)[i]), name
+
+
 def test_witness_on_demand_is_the_same(crowd):
     at_once, later = (gs.distance_to_frustum(*crowd, want=want) for want in (("distance", "witness"), ("distance",)))
     assert (at_once.point_a == later.point_a).all()

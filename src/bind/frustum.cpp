@@ -96,8 +96,7 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const CullPlanes& planes, const CullFram
     return counts;
 }
 
-// -------------------------------------------------------------------------------------------------------
-// points
+// ---------------------------------------------------------------------------------------------- points
 
 template <int Sides>
 View<Sides> unpack_view(const double* p) {
@@ -134,7 +133,7 @@ struct PointAnswers {
     }
 };
 
-/// Groups of four points; a group in which some number is out of range is done again, one by one.
+/// Groups of four points.  What is out of range is done again, point by point.
 template <class Kinds, bool Skewed, int Sides>
 GEOMSRV_WIDE_CLONES void measure_points(const DistanceFrame<Lanes, Sides>& frame, const View<Sides>& view,
                                         const double* points, std::size_t count, PointAnswers out) {
@@ -157,8 +156,10 @@ GEOMSRV_WIDE_CLONES void measure_points(const DistanceFrame<Lanes, Sides>& frame
         }
         if (!all(found.in_range)) [[unlikely]] {
             if (!wide) wide = distance_frame<long double>(view);
-            for (std::size_t k = i; k < i + Lanes::kCount; ++k) {
-                out.put(k, distance_in_long_double(*wide, points + kDimension * k));
+            for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
+                if (found.in_range.v[lane] == 0) {
+                    out.put(i + lane, distance_in_long_double(*wide, points + kDimension * (i + lane)));
+                }
             }
         }
     }

@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 
 #include "geom/lanes.hpp"
@@ -35,13 +36,14 @@ GEOMSRV_INLINE void unrolled(Step step) {
     }(std::make_index_sequence<Count>{});
 }
 
-/// a b - c d with at most 2 units of roundoff, whatever cancels (Kahan; Jeannerod, Louvet, Muller 2013,
-/// theorem 3.1).
-template <class Real>
-GEOMSRV_INLINE Real difference_of_products(Real a, Real b, Real c, Real d) {
-    const Real cd = c * d;
-    const Real error = std::fma(-c, d, cd);
-    return std::fma(a, b, -cd) + error;
+/// a b - c d with at most 2 units of roundoff, whatever cancels (Kahan's algorithm; Jeannerod, Louvet and
+/// Muller, "Further analysis of Kahan's algorithm for the accurate computation of 2x2 determinants", 2013).
+template <class Number>
+GEOMSRV_INLINE Number difference_of_products(const Number& a, const Number& b, const Number& c,
+                                             const Number& d) {
+    const Number cd = c * d;
+    const Number error = fused_multiply_add(-c, d, cd);
+    return fused_multiply_add(a, b, -cd) + error;
 }
 
 /// Rows of a small square matrix.
@@ -54,10 +56,9 @@ struct Rows {
 /// is the i-th frustum coordinate even where the axes are not quite orthonormal.  For orthonormal axes it is
 /// the axes themselves.
 ///
-/// Each entry has a relative error of at most kDualError: 2u from the minor, 5.4u from the determinant
-/// (products and sums of the three minors, which have Cauchy-Schwarz sum of magnitudes <= 1.05 det), u from
-/// the division.
-inline constexpr double kDualError = 9.0 * kUnitRoundoff;
+/// Each entry has a relative error of at most 9 units of roundoff: 2 from the minor, 5.4 from the determinant
+/// (2 minors, 1 product, 2 sums, of terms that sum to at most 1.05 times it in magnitude), 1 from the
+/// division.
 
 template <class Real>
 Rows<Real, 3> dual_basis(const Rows<double, 3>& axes) {

@@ -8,8 +8,7 @@ namespace geomsrv {
 
 namespace {
 
-// ---------------------------------------------------------------------------------------------- powers of
-// two
+// ----------------------------------------------------------------------------------------- powers of two
 
 /// 2^exponent as two factors that are both normal numbers; products by it are exact unless the result itself
 /// leaves the range of double.  Exponents beyond +-2044 are cut there, where every product is 0 or infinite
@@ -37,44 +36,41 @@ double largest(Vec3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::f
 
 Vec3 magnitudes(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
 
-// ------------------------------------------------------------------------------------------------- plane
-// bounds
+// -------------------------------------------------------------------------------- error bounds of planes
 
-// u = unit roundoff.  Rounding errors of the planes, as multiples of u times the sum of the magnitudes of the
-// terms:
-//   entries of a normal        9 (dual basis) + 2 (p * row + r * row)                                   11
-//   s = normal . (C - E)       11 + 1 (C - E) + 1 (product) + 2 (sums) + 1 (minus offset)               16
-//   r = sum e_i |normal . A_i| 11 + 1 (product) + 2 (sums) + 1 (times e) + 2 (sums)                     17
-//   s +- r                                                                                              +1
-// Entries of A_i sum to at most 1.75 in magnitude, so the magnitudes sum to at most N (|X|_1 + 1.75 sum e_i)
-// with N the largest entry of the normal, cancellation not counted; `reach` has 2 for 1.75.  18 <= 20; 18
-// * 1.75 <= 20 * 2.
+// Rounding errors of stages 1 and 2, in units u of roundoff times the sum of magnitudes of the terms:
+//
+//   entries of a normal         9 (dual basis) + 2 (p row + r row)                                  = 11
+//   s = normal . (C - E)        11 + 1 (C - E) + 1 (product) + 2 (sums) + 1 (offset)                = 16
+//   r = sum e_i |normal . A_i|  11 + 1 (product) + 2 (sums) + 1 (times e_i) + 2 (sums)              = 17
+//   s - r, s + r                                                                                      + 1
+//
+// The entries of A_i sum to at most 1.75 in magnitude, so those magnitudes sum to at most N times
+// |C - E|_1 + 1.75 sum e_i, where N is the largest entry of the normal, cancellation not counted.  `reach`
+// has 2 for 1.75: 18 <= 20, and 18 * 1.75 <= 20 * 2.
 constexpr double kPlaneError = 20.0 * kUnitRoundoff;
 
-// A unit axis of a box may be off by 1e-2 in each product of rows, so sum e_i |n . A_i| <= |n| |e|
-// sqrt(1.03).
-constexpr double kMaxStretch = 1.02;
-
-// The subtraction of the offset and the final s +- r round once each, relative to the offset too.
+// The offset takes part in two of these roundings, those of s and of s +- r.
 constexpr double kOffsetError = 2.0 * kUnitRoundoff;
 
 // About 30 products per plane may underflow, each losing at most 2^-1075; normals are about 1.
 constexpr double kUnderflow = 0x1p-1060;
 
-// ------------------------------------------------------------------------------------------------- axes
-// bounds
+// Products of rows of box axes are off by at most 1e-2, so sum e_i |n . A_i| <= |n| |e| sqrt(1.03).
+constexpr double kMaxStretch = 1.02;
+
+// ---------------------------------------------------------------------------------- error bounds of axes
 
 // Culling is affine invariant, so everything is brought to about 1 by powers of two, which round nothing:
-// coordinates (a, b, d) each by its own, which makes an ordinary frustum of a needle or of a very wide
-// window; then the edges B_i of the box, each by its own against its extent; then all lengths.  Products of
-// what is left cannot overflow.  Windows thinner than 2^-1000 near stay thin, so that the map itself does not
-// overflow.
+// the coordinates (a, b, d), each by its own, which makes an ordinary frustum of a needle or a very wide
+// window; then the edges B_i of the box, each against its extent; then all lengths.  Products of what is left
+// cannot overflow.  Windows thinner than 2^-1000 near stay thin, lest the map itself overflow.
 constexpr int kMinSlopeExponent = -1000;
 
-// Entries of edges below this are set to zero, and the tolerances below are at least kFloor in each
-// coordinate, which covers that change (4 entries of at most 2^-300) and all underflow: edges that are not
-// zero are then >= 2^-300, entries of a cross product that are not zero are >= 2^-600 2^-104 (both factors
-// have 53 bits), times kFloor >= 2^-994, while an underflow loses 2^-1075.
+// Entries of edges below this are set to zero, and tolerances are at least kFloor in each coordinate.  That
+// covers the change (4 entries of at most 2^-300) and all underflow: edges that are not zero are >= 2^-300,
+// entries of a cross product that are not zero are >= 2^-600 2^-104 (both factors have 53 bits), times kFloor
+// >= 2^-994, while an underflow loses 2^-1075.
 constexpr double kNegligible = 0x1p-300;
 constexpr double kFloor = 0x1p-290;
 
@@ -82,28 +78,27 @@ constexpr double kFloor = 0x1p-290;
 // underflow, each losing at most 2^-1075.  What they lose is mapped, scaled and added to kFloor.
 constexpr double kLost = 0x1p-1060;
 
-// Tolerance per coordinate is kCullError times the magnitudes Z + W, where Z = |C - E| + sum e_k |A_k|,
-// mapped with the magnitudes of the dual basis, and W = extent of the (truncated) frustum.  Two parts, u =
-// unit roundoff:
+// The tolerance tol of a coordinate is kCullError times Z + W.  Z = |C - E| + sum e_k |A_k|, mapped with the
+// magnitudes of the dual basis; W = extent of the frustum as far as it matters.  It has two parts, in units u
+// of roundoff:
 //
-// 1. The box in floating point is not the given box.  Each of its points is off by at most 13 u Z in each
-// coordinate:
-//    9 (dual basis) + 1 (C - E) + 1 (product) + 2 (sums).
-// 2. For that rounded box a projection on an axis M is off by at most 10 u sum_i |M_i| (Z_i + W_i):
-//    2 (entry of M, relative, thanks to difference_of_products) + 1 (product) + 2 (sums) + 1 (times e) + 2
-//    (sums) for the box, 2 + 1 + 1 (width) + 2 + 1 (far end) for the frustum, and 2 for the final
-//    differences.
+// 1. The box in floating point is not the given one: each of its points is off by at most 13 u Z.
+//    9 (dual basis) + 1 (C - E) + 1 (product) + 2 (sums)
+// 2. For that rounded box, the gap along an axis M is off by at most 10 u sum |M| (Z + W).
+//    box      2 (entry of M, relative) + 1 (product) + 2 (sums) + 1 (times e) + 2 (sums)
+//    frustum  2 (entry of M, relative) + 1 (width) + 1 (product) + 2 (sums) + 1 (far end) + 1 (times it)
+//    gap      2 (differences)
 //
 // Together 23 u; 32 u leaves room for second-order terms and for the rounding of the bound itself.
 //
-// Why this proves the verdict.  Let the gap along M be the distance between the two projections, < 0 if they
-// overlap.
-// - A gap above tol = sum |M_i| tol_i on any axis: the given bodies are disjoint along that axis.
-// - An overlap of at least tol on all axes: let K be the set of differences of points of frustum and rounded
-// box.  The
-//   axes contain all facet normals of K (also for flat boxes), so K contains the brick Q = +-13 u Z.  The
-//   given box is within Q of the rounded one, coordinate by coordinate; were it disjoint from the frustum,
-//   some direction would separate them, and K would lack a point of Q in that direction.
+// Why this proves a verdict.  The gap along M is the distance between the two projections, < 0 if they
+// overlap; its bound is sum |M| tol.
+//
+// - Some gap > bound: the given bodies are disjoint, for M separates them.
+// - All gaps <= -bound: let K be the set of differences of points of the frustum and of the rounded box.  The
+//   axes hold all facet normals of K, for flat boxes too, so K contains the brick Q = +-13 u Z.  The given
+//   box is within Q of the rounded one; were it disjoint from the frustum, then along the direction that
+//   separates them K would not contain Q.
 constexpr double kCullError = 32.0 * kUnitRoundoff;
 
 /// What the axes tested so far say.
@@ -120,13 +115,14 @@ struct Tally {
     }
 };
 
-/// The box in scaled frustum coordinates.
-struct LocalBox {
+/// Frustum coordinates of a box, and the lengths of the frustum in the same unit.
+struct LocalScene {
     Vec3 center;
-    Vec3 edge[3];  ///< A_i mapped and scaled to about 1, without extents: boxes of zero extent keep their
-                   ///< directions
-    Vec3 half;     ///< extents in units of these edges
-    Vec3 bound;    ///< Z above
+    Vec3 edge[3];    ///< A_i, scaled to about 1; without extents, so that flat boxes keep their directions
+    double half[3];  ///< extents in units of these edges
+    Vec3 bound;      ///< Z above
+    Vec3 floor;      ///< least tolerance
+    double near, far;
 };
 
 double drop_negligible(double x) { return std::fabs(x) < kNegligible ? 0.0 : x; }
@@ -139,12 +135,15 @@ Vec3 map_magnitudes(const Mat3& m, Vec3 v) {
 }
 
 /// Sum of e_i |M . B_i|: half the width of the box along M.
-double radius(const LocalBox& box, Vec3 m) {
-    return box.half.x * std::fabs(dot(m, box.edge[0])) + box.half.y * std::fabs(dot(m, box.edge[1])) +
-           box.half.z * std::fabs(dot(m, box.edge[2]));
+GEOMSRV_INLINE double radius(const LocalScene& scene, Vec3 m) {
+    return scene.half[0] * std::fabs(dot(m, scene.edge[0])) +
+           scene.half[1] * std::fabs(dot(m, scene.edge[1])) +
+           scene.half[2] * std::fabs(dot(m, scene.edge[2]));
 }
 
-/// Half spaces of the frustum.
+GEOMSRV_INLINE double error_bound(Vec3 m, Vec3 tolerance) { return dot(magnitudes(m), tolerance); }
+
+/// The same for the half spaces of the frustum, which also tell whether the box is inside.
 struct PlaneTally {
     Tally axes;
     bool inside = true;              ///< no corner beyond any plane
@@ -160,6 +159,7 @@ struct PlaneTally {
     }
 };
 
+/// World to frustum coordinates.
 Mat3 to_frustum(const Mat3& axes) {
     Rows<double, 3> rows;
     for (int i = 0; i < 3; ++i) {
@@ -222,162 +222,173 @@ CullFrame cull_frame(const Frustum& frustum) {
         return std::max(std::ilogb(std::max(std::fabs(low), std::fabs(high))) - depth, kMinSlopeExponent);
     };
     const int left = slope_exponent(frustum.l0, frustum.l1), up = slope_exponent(frustum.u0, frustum.u1);
-    CullFrame frame{};
+    CullFrame frame;
     frame.origin = frustum.origin;
     frame.dual = {{PowerOfTwo(-left) * dual.row[0], PowerOfTwo(-up) * dual.row[1], dual.row[2]}};
     const PowerOfTwo left_unit(-depth - left), up_unit(-depth - up);
-    const double l[2] = {drop_negligible(left_unit * frustum.l0), drop_negligible(left_unit * frustum.l1)};
-    const double u[2] = {drop_negligible(up_unit * frustum.u0), drop_negligible(up_unit * frustum.u1)};
-    for (int k = 0; k < 4; ++k) {
-        frame.left[k] = l[k & 1];
-        frame.up[k] = u[k >> 1];
-        frame.left_step[k] = l[~k & 1] - l[k & 1];
-        frame.up_step[k] = u[~k >> 1 & 1] - u[k >> 1];
-    }
+    frame.l0 = drop_negligible(left_unit * frustum.l0);
+    frame.l1 = drop_negligible(left_unit * frustum.l1);
+    frame.u0 = drop_negligible(up_unit * frustum.u0);
+    frame.u1 = drop_negligible(up_unit * frustum.u1);
+    frame.left = Lanes(Lanes::Vector{frame.l0, frame.l1, frame.l0, frame.l1});
+    frame.up = Lanes(Lanes::Vector{frame.u0, frame.u0, frame.u1, frame.u1});
+    const double width = frame.l1 - frame.l0, height = frame.u1 - frame.u0;
+    frame.left_step = Lanes(Lanes::Vector{width, -width, width, -width});
+    frame.up_step = Lanes(Lanes::Vector{height, height, -height, -height});
     frame.view = PowerOfTwo(-depth) * frustum.near;
     frame.near = frustum.near;
     frame.far = frustum.far;
     return frame;
 }
 
-GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const OrientedBox& given) {
-    // C - E must not overflow; a quarter of it cannot.
-    const double shrink = std::max(largest(given.center), largest(frame.origin)) > 0x1p1020 ? 0.25 : 1.0;
-    const Vec3 offset = shrink * given.center - shrink * frame.origin;
-    const double length = std::max(largest(offset), shrink * largest(given.half_extents));
-    if (length == 0.0) {
-        return {CullState::outside, true};  // a single point at the apex
-    }
+namespace {
+
+/// `offset` is C - E times `shrink`, `length` the largest length of the box, seen from the apex.
+GEOMSRV_INLINE LocalScene local_scene(const CullFrame& frame, const OrientedBox& box, Vec3 offset,
+                                      double shrink, double length) {
+    LocalScene scene;
     const int exponent = exponent_of(length);
     const PowerOfTwo unit(-exponent);
-    const Vec3 x = unit * offset;
-    const Vec3 extents = unit * (shrink * given.half_extents);
-
-    LocalBox box;
-    box.center = frame.dual * x;
-    box.bound = map_magnitudes(frame.dual, x);
-    double half[3] = {extents.x, extents.y, extents.z};
+    const Vec3 x = unit * offset, extents = unit * (shrink * box.half_extents);
+    const double given_half[3] = {extents.x, extents.y, extents.z};
+    scene.bound = map_magnitudes(frame.dual, x);
     for (int i = 0; i < 3; ++i) {
-        const Vec3 edge = frame.dual * given.axes.row[i];
-        box.bound = box.bound + half[i] * map_magnitudes(frame.dual, given.axes.row[i]);
+        const Vec3 edge = frame.dual * box.axes.row[i];
         const int size = exponent_of(largest(edge));
-        box.edge[i] = drop_negligible(PowerOfTwo(-size) * edge);
-        half[i] = PowerOfTwo(size) * half[i];
+        scene.edge[i] = drop_negligible(PowerOfTwo(-size) * edge);
+        scene.half[i] = PowerOfTwo(size) * given_half[i];
+        scene.bound = scene.bound + given_half[i] * map_magnitudes(frame.dual, box.axes.row[i]);
     }
-    const int size = exponent_of(largest(box.bound));
-    const PowerOfTwo rest(-size);
-    box.center = rest * box.center;
-    box.bound = rest * box.bound;
-    for (double& e : half) e = rest * e;
-    box.half = {half[0], half[1], half[2]};
-    const PowerOfTwo total(-exponent - size);
-    const double near = total * (shrink * frame.near), far = total * (shrink * frame.far);
-    const Vec3 c = box.center, lost = {kLost, kLost, kLost};
-    const Vec3 floor = rest * (map_magnitudes(frame.dual, lost) + lost) + Vec3{kFloor, kFloor, kFloor};
+    const int size = exponent_of(largest(scene.bound));
+    const PowerOfTwo rest(-size), total(-exponent - size);
+    const Vec3 lost = {kLost, kLost, kLost};
+    scene.center = rest * (frame.dual * x);
+    scene.bound = rest * scene.bound;
+    scene.floor = rest * (map_magnitudes(frame.dual, lost) + lost) + Vec3{kFloor, kFloor, kFloor};
+    for (double& half : scene.half) half = rest * half;
+    scene.near = total * (shrink * frame.near);
+    scene.far = total * (shrink * frame.far);
+    return scene;
+}
 
-    // Near and far.  A box in front of the near plane ends here, so below near <= largest depth of the box.
-    const double depth_radius = radius(box, {0.0, 0.0, 1.0});
-    const double depth_bound = kCullError * box.bound.z + floor.z;
-    if (near - (c.z + depth_radius) > depth_bound) {
-        return {CullState::outside, true};
-    }
-    // Cut the frustum off well beyond the deepest point of the box: that changes nothing for the box, and the
-    // far end no longer multiplies rounding noise by far / near.
-    const double cut = std::min(far, 2.0 * (c.z + depth_radius + depth_bound));
-    const double far_end = cut / frame.view,
-                 near_end = near / frame.view;  // slanted edges: near_end v to far_end v
-    const Vec3 window = {std::fabs(frame.left[0]) + std::fabs(frame.left[1]),
-                         std::fabs(frame.up[0]) + std::fabs(frame.up[2]), frame.view};
-    const Vec3 tolerance = kCullError * (box.bound + far_end * window) + floor;
-    const auto error_bound = [&](Vec3 m) { return dot(magnitudes(m), tolerance); };
-
+GEOMSRV_INLINE PlaneTally test_planes(const CullFrame& frame, const LocalScene& scene, Vec3 tolerance) {
+    const Vec3 c = scene.center;
+    const double depth_radius = radius(scene, {0.0, 0.0, 1.0});
     PlaneTally planes;
-    planes.add(near - c.z, depth_radius, tolerance.z);
-    planes.add(c.z - far, depth_radius, tolerance.z);
-    for (const int k : {0, 3}) {
-        const double sign = k == 0 ? -1.0 : 1.0;  // outward: -L and -U side, then +L and +U side
-        const Vec3 across = {sign * frame.view, 0.0, -sign * frame.left[k]};
-        const Vec3 upward = {0.0, sign * frame.view, -sign * frame.up[k]};
-        planes.add(dot(across, c), radius(box, across), error_bound(across));
-        planes.add(dot(upward, c), radius(box, upward), error_bound(upward));
+    planes.add(scene.near - c.z, depth_radius, tolerance.z);
+    planes.add(c.z - scene.far, depth_radius, tolerance.z);
+    for (const Vec3 normal : {Vec3{frame.view, 0.0, -frame.l1}, Vec3{-frame.view, 0.0, frame.l0},
+                              Vec3{0.0, frame.view, -frame.u1}, Vec3{0.0, -frame.view, frame.u0}}) {
+        planes.add(dot(normal, c), radius(scene, normal), error_bound(normal, tolerance));
     }
-    if (planes.axes.proven_apart || planes.proven_inside) {
-        return {planes.axes.proven_apart ? CullState::outside : CullState::inside, true};
-    }
+    return planes;
+}
 
-    Tally axes = planes.axes;
-    // Gap between the projections of the box, center +- r, and of the frustum, whose slanted edges project
-    // from near_end q to far_end q with q in [low, high].
-    const auto add = [&](Vec3 m, double r, double low, double high) {
-        const double center = dot(m, c);
+/// Faces of the box, L x B_i and U x B_i.  The slanted edges run from near_end v_k to far_end v_k.
+GEOMSRV_INLINE Tally test_box_axes(const CullFrame& frame, const LocalScene& scene, double near_end,
+                                   double far_end, Vec3 tolerance) {
+    Tally axes;
+    // Gap between the box, center +- r, and the frustum: M . v_k is between `low` and `high`.
+    const auto add = [&](Vec3 m, double r, double low, double high) __attribute__((always_inline)) {
+        const double center = dot(m, scene.center);
         const double least = std::min(near_end * low, far_end * low);
         const double most = std::max(near_end * high, far_end * high);
-        axes.add(std::max((center - r) - most, least - (center + r)), error_bound(m));
+        axes.add(std::max((center - r) - most, least - (center + r)), error_bound(m, tolerance));
     };
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
-        const Vec3 b = box.edge[i], bj = box.edge[j], bk = box.edge[k];
-        // Face of the box.  Its normal is a cross product of edges: the map need not keep right angles.
+        const Vec3 b = scene.edge[i], bj = scene.edge[j], bk = scene.edge[k];
+        // The normal of a face is the cross product of its edges: the map need not keep right angles.
         const Vec3 normal = {difference_of_products(bj.y, bk.z, bj.z, bk.y),
                              difference_of_products(bj.z, bk.x, bj.x, bk.z),
                              difference_of_products(bj.x, bk.y, bj.y, bk.x)};
-        const double l0 = frame.left[0] * normal.x, l1 = frame.left[1] * normal.x;
-        const double u0 = frame.up[0] * normal.y, u1 = frame.up[2] * normal.y;
+        const double l0 = frame.l0 * normal.x, l1 = frame.l1 * normal.x;
+        const double u0 = frame.u0 * normal.y, u1 = frame.u1 * normal.y;
         const double d = frame.view * normal.z;
-        add(normal, half[i] * std::fabs(dot(normal, b)), std::min(l0, l1) + std::min(u0, u1) + d,
+        add(normal, scene.half[i] * std::fabs(dot(normal, b)), std::min(l0, l1) + std::min(u0, u1) + d,
             std::max(l0, l1) + std::max(u0, u1) + d);
-        // L x B_i and U x B_i.
-        const Vec3 left_cross = {0.0, -b.z, b.y}, up_cross = {b.z, 0.0, -b.x};
-        const double v0 = frame.up[0] * left_cross.y, v1 = frame.up[2] * left_cross.y,
-                     v = frame.view * left_cross.z;
-        add(left_cross, half[j] * std::fabs(dot(left_cross, bj)) + half[k] * std::fabs(dot(left_cross, bk)),
-            std::min(v0, v1) + v, std::max(v0, v1) + v);
-        const double w0 = frame.left[0] * up_cross.x, w1 = frame.left[1] * up_cross.x,
-                     w = frame.view * up_cross.z;
-        add(up_cross, half[j] * std::fabs(dot(up_cross, bj)) + half[k] * std::fabs(dot(up_cross, bk)),
-            std::min(w0, w1) + w, std::max(w0, w1) + w);
-    }
-    if (axes.proven_apart) {
-        return {CullState::outside, true};
-    }
 
-    // Slanted edge x B_i.  Near-parallel edges make M tiny; it keeps its relative accuracy by
-    // difference_of_products. Exactly, M . v_k = 0 and M . B_i = 0: neither is computed, for their rounding
-    // noise, multiplied by far_end or by the extent, would be taken for a gap or would hide one.  The other
-    // edges of the frustum are v_k plus a step, so they project to left_step M_a, up_step M_b and their sum,
-    // free of cancellation.
+        const auto others = [&](Vec3 m) __attribute__((always_inline)) {
+            return scene.half[j] * std::fabs(dot(m, bj)) + scene.half[k] * std::fabs(dot(m, bk));
+        };
+        const Vec3 left_cross = {0.0, -b.z, b.y}, up_cross = {b.z, 0.0, -b.x};
+        const double v0 = frame.u0 * left_cross.y, v1 = frame.u1 * left_cross.y;
+        const double v = frame.view * left_cross.z;
+        add(left_cross, others(left_cross), std::min(v0, v1) + v, std::max(v0, v1) + v);
+        const double w0 = frame.l0 * up_cross.x, w1 = frame.l1 * up_cross.x;
+        const double w = frame.view * up_cross.z;
+        add(up_cross, others(up_cross), std::min(w0, w1) + w, std::max(w0, w1) + w);
+    }
+    return axes;
+}
+
+/// Slanted edge x B_i.  Where the two are near parallel, M is tiny; difference_of_products keeps its relative
+/// accuracy.  M . v_k and M . B_i are 0 and not computed: their rounding noise, multiplied by far_end or by
+/// the extent, would be taken for a gap or hide one.  The other slanted edges are v_k plus steps, so they
+/// project to left_step M_a, up_step M_b and the sum of both, free of cancellation.
+GEOMSRV_INLINE Tally test_slanted_edges(const CullFrame& frame, const LocalScene& scene, double far_end,
+                                        Vec3 tolerance) {
+    LaneMask separated = Lanes(1.0) < Lanes(0.0), proven_apart = separated, proven_meet = ~separated;
+    const Lanes view = frame.view, none = 0.0;
     for (int i = 0; i < 3; ++i) {
+        const Vec3 b = scene.edge[i];
+        const Lanes mx = difference_of_products(frame.up, Lanes(b.z), view, Lanes(b.y));
+        const Lanes my = difference_of_products(view, Lanes(b.x), frame.left, Lanes(b.z));
+        const Lanes mz = difference_of_products(frame.left, Lanes(b.y), frame.up, Lanes(b.x));
+        const auto along = [&](Vec3 v)
+                               __attribute__((always_inline)) { return mx * v.x + my * v.y + mz * v.z; };
         const int j = (i + 1) % 3, k = (i + 2) % 3;
-        const Vec3 b = box.edge[i], bj = box.edge[j], bk = box.edge[k];
-        double gap[4], bound[4];
-        for (int v = 0; v < 4; ++v) {
-            const double mx = difference_of_products(frame.up[v], b.z, frame.view, b.y);
-            const double my = difference_of_products(frame.view, b.x, frame.left[v], b.z);
-            const double mz = difference_of_products(frame.left[v], b.y, frame.up[v], b.x);
-            const double center = mx * c.x + my * c.y + mz * c.z;
-            const double r = half[j] * std::fabs(mx * bj.x + my * bj.y + mz * bj.z) +
-                             half[k] * std::fabs(mx * bk.x + my * bk.y + mz * bk.z);
-            const double p = frame.left_step[v] * mx, q = frame.up_step[v] * my, pq = p + q;
-            const double most = far_end * std::max(std::max(0.0, p), std::max(q, pq));
-            const double least = far_end * std::min(std::min(0.0, p), std::min(q, pq));
-            gap[v] = std::max((center - r) - most, least - (center + r));
-            bound[v] =
-                std::fabs(mx) * tolerance.x + std::fabs(my) * tolerance.y + std::fabs(mz) * tolerance.z;
-        }
-        for (int v = 0; v < 4; ++v) {
-            axes.add(gap[v], bound[v]);
-        }
+        const Lanes center = along(scene.center);
+        const Lanes r =
+            scene.half[j] * magnitude(along(scene.edge[j])) + scene.half[k] * magnitude(along(scene.edge[k]));
+        const Lanes p = frame.left_step * mx, q = frame.up_step * my, pq = p + q;
+        const Lanes most = far_end * greater(greater(none, p), greater(q, pq));
+        const Lanes least = far_end * lesser(lesser(none, p), lesser(q, pq));
+        const Lanes gap = greater((center - r) - most, least - (center + r));
+        const Lanes bound =
+            magnitude(mx) * tolerance.x + magnitude(my) * tolerance.y + magnitude(mz) * tolerance.z;
+        separated = separated | (none < gap);
+        proven_apart = proven_apart | (bound < gap);
+        proven_meet = proven_meet & (bound <= -gap);
     }
-    if (axes.proven_apart) {
-        return {CullState::outside, true};
-    }
-    if (planes.inside) {
-        return {CullState::inside, false};
-    }
-    if (axes.separated) {
-        return {CullState::outside, false};
-    }
-    return {CullState::intersects, axes.proven_meet && planes.proven_not_inside};
+    return {any(separated), any(proven_apart), all(proven_meet)};
+}
+
+}  // namespace
+
+GEOMSRV_WIDE_CLONES CullVerdict cull_by_axes(const CullFrame& frame, const OrientedBox& box) {
+    // C - E must not overflow; a quarter of it cannot.
+    const double shrink = std::max(largest(box.center), largest(frame.origin)) > 0x1p1020 ? 0.25 : 1.0;
+    const Vec3 offset = shrink * box.center - shrink * frame.origin;
+    const double length = std::max(largest(offset), shrink * largest(box.half_extents));
+    if (length == 0.0) return {CullState::outside, true};  // a single point at the apex
+    const LocalScene scene = local_scene(frame, box, offset, shrink, length);
+
+    // A box in front of the near plane ends here, so below near <= its largest depth.
+    const double deepest = scene.center.z + radius(scene, {0.0, 0.0, 1.0});
+    const double depth_bound = kCullError * scene.bound.z + scene.floor.z;
+    if (scene.near - deepest > depth_bound) return {CullState::outside, true};
+
+    // Cut the frustum off well beyond the deepest point of the box: that changes nothing for the box, and the
+    // far end no longer multiplies rounding noise by far / near.
+    const double cut = std::min(scene.far, 2.0 * (deepest + depth_bound));
+    const double near_end = scene.near / frame.view, far_end = cut / frame.view;
+    const Vec3 window = {std::fabs(frame.l0) + std::fabs(frame.l1), std::fabs(frame.u0) + std::fabs(frame.u1),
+                         frame.view};
+    const Vec3 tolerance = kCullError * (scene.bound + far_end * window) + scene.floor;
+
+    const PlaneTally planes = test_planes(frame, scene, tolerance);
+    if (planes.axes.proven_apart) return {CullState::outside, true};
+    if (planes.proven_inside) return {CullState::inside, true};
+    const Tally faces = test_box_axes(frame, scene, near_end, far_end, tolerance);
+    if (faces.proven_apart) return {CullState::outside, true};
+    const Tally edges = test_slanted_edges(frame, scene, far_end, tolerance);
+    if (edges.proven_apart) return {CullState::outside, true};
+
+    if (planes.inside) return {CullState::inside, false};
+    if (planes.axes.separated || faces.separated || edges.separated) return {CullState::outside, false};
+    const bool meet = planes.axes.proven_meet && faces.proven_meet && edges.proven_meet;
+    return {CullState::intersects, meet && planes.proven_not_inside};
 }
 
 }  // namespace geomsrv

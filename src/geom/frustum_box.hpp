@@ -38,8 +38,7 @@ struct CullVerdict {
     bool certain = false;  ///< exact arithmetic on the same numbers is proven to give the same state
 };
 
-// ------------------------------------------------------------------------------------------- stages 1 and 2:
-// planes
+// -------------------------------------------------------------------------------- stages 1 and 2: planes
 
 /// Planes with outward normals n: a point x is outside if n . (x - origin) > offset.
 struct PlaneLanes {
@@ -79,22 +78,22 @@ inline constexpr double kMinSquaredRadius = 0x1p-900;
 /// (0.0) and `inside` (2.0), else the answer is kUndecided.
 GEOMSRV_INLINE Lanes classify_by_sphere(const CullPlanes& planes, const Lanes (&center)[3],
                                         const Lanes (&half)[3]) {
-    const Lanes x = center[0] - planes.origin.x, y = center[1] - planes.origin.y,
-                z = center[2] - planes.origin.z;
+    const Lanes x = center[0] - planes.origin.x;
+    const Lanes y = center[1] - planes.origin.y;
+    const Lanes z = center[2] - planes.origin.z;
     const Lanes radius =
         square_root((half[0] * half[0] + half[1] * half[1]) + (half[2] * half[2] + kMinSquaredRadius));
     // As for boxes below, 2 (e_0 + e_1 + e_2) <= 3.5 radius.
     const Lanes reach = (magnitude(x) + magnitude(y) + magnitude(z)) + 4.0 * radius;
-    LaneMask within = reach < Lanes(kMaxReach);
-    LaneMask beyond = ~within;
+    const LaneMask in_range = reach < Lanes(kMaxReach);
+    LaneMask within = in_range, beyond = ~in_range;
     for (const PlaneLanes& plane : planes.each) {
         const Lanes s = (plane.x * x + plane.y * y + plane.z * z) - plane.offset;
         const Lanes r = radius * plane.length + (plane.error_per_length * reach + plane.error);
         beyond = beyond | (r < s);
         within = within & (s < -r);
     }
-    beyond = beyond & (reach < Lanes(kMaxReach));
-    return select(beyond, Lanes(0.0), select(within, Lanes(2.0), Lanes(kUndecided)));
+    return select(beyond & in_range, Lanes(0.0), select(within, Lanes(2.0), Lanes(kUndecided)));
 }
 
 /// One box against four planes at a time.
@@ -102,8 +101,9 @@ GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes& planes, const O
     const Vec3 x = box.center - planes.origin, e = box.half_extents;
     const auto [a0, a1, a2] = box.axes.row;
     const double reach = (std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z)) + 2.0 * (e.x + e.y + e.z);
-    LaneMask in_range = Lanes(reach) < Lanes(kMaxReach);
-    LaneMask beyond = ~in_range, within = in_range, centre = in_range, across = beyond;
+    if (!(reach < kMaxReach)) return kUndecided;
+    const LaneMask all_set = Lanes(0.0) <= Lanes(0.0);
+    LaneMask beyond = ~all_set, within = all_set, centre = all_set, across = ~all_set;
     for (const PlaneLanes& plane : planes.group) {
         const auto along = [&](Vec3 v) __attribute__((always_inline)) {
             return plane.x * v.x + plane.y * v.y + plane.z * v.z;
@@ -116,23 +116,22 @@ GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes& planes, const O
         centre = centre & (s < -error);
         across = across | (error < s + r);
     }
-    if (!(reach < kMaxReach)) return kUndecided;
-    return any(beyond)                  ? std::uint8_t{0}
-           : all(within)                ? std::uint8_t{2}
-           : all(centre) && any(across) ? std::uint8_t{1}
-                                        : kUndecided;
+    if (any(beyond)) return 0;
+    if (all(within)) return 2;
+    return all(centre) && any(across) ? 1 : kUndecided;
 }
 
-// ----------------------------------------------------------------------------------------- stage 3:
-// separating axes
+// ------------------------------------------------------------------------------ stage 3: separating axes
 
 /// A frustum in units that make its numbers about 1: the window is [-1, 1] or so, the near depth in [1, 2).
 struct CullFrame {
     Vec3 origin;
-    Mat3 dual;                        ///< world to frustum coordinates, rows scaled by powers of two
-    double left[4], up[4], view;      ///< directions v_k = (left_k, up_k, view) of the four slanted edges
-    double left_step[4], up_step[4];  ///< v of the neighbour along L, along U, minus v_k
-    double near, far;                 ///< [m]
+    Mat3 dual;                 ///< world to frustum coordinates, rows scaled by powers of two
+    Lanes left, up;            ///< the four slanted edges have directions v_k = (left_k, up_k, view)
+    Lanes left_step, up_step;  ///< v of the neighbour along L, along U, minus v_k
+    double l0, l1, u0, u1;     ///< left and up of the edges
+    double view;
+    double near, far;  ///< [m]
 };
 
 CullFrame cull_frame(const Frustum& frustum);

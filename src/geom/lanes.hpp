@@ -113,6 +113,15 @@ GEOMSRV_INLINE Lanes magnitude(const Lanes& x) {
     return Lanes(Lanes::Vector{std::fabs(x[0]), std::fabs(x[1]), std::fabs(x[2]), std::fabs(x[3])});
 }
 
+template <class Real>
+GEOMSRV_INLINE Real fused_multiply_add(Real a, Real b, Real c) {
+    return std::fma(a, b, c);
+}
+GEOMSRV_INLINE Lanes fused_multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) {
+    return Lanes(Lanes::Vector{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1]),
+                               std::fma(a[2], b[2], c[2]), std::fma(a[3], b[3], c[3])});
+}
+
 GEOMSRV_INLINE double square_root(double x) { return std::sqrt(x); }
 GEOMSRV_INLINE long double square_root(long double x) { return std::sqrt(x); }
 GEOMSRV_INLINE Lanes square_root(const Lanes& x) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "geom/rounding.hpp"
+
 namespace geomsrv {
 
 namespace {
@@ -13,14 +15,77 @@ namespace {
 static_assert(std::numeric_limits<long double>::max_exponent >= 16 * 1024,
               "squares of ratios of doubles must be representable");
 
-// Entries of the Gram matrix are off by at most 4u (2 products' worth of roundings of numbers up to 1), the
-// Frobenius norm of a 3 x 3 matrix of them by 12u.
+// Entries of the Gram matrix are off by at most 4 u (1 product and 3 sums of terms that add up to 1), so the
+// Frobenius norm of its difference from the identity by 12 u.
 constexpr double kGramError = 12.0 * kUnitRoundoff;
 
-// Each projection beyond the first shrinks what the defect of the axes does to the answer by the norm of the
-// defect.
+// After k further projections the defect of the axes has changed the answer by at most its norm to the power
+// k + 1, relative to the distance.  This is below what rounding leaves, and above the norm for axes that are
+// orthonormal but for rounding, which need no further projection.
 constexpr double kMaxContraction = 0x1p-48;
 
+/// double for Lanes: a frame is prepared in plain numbers.
+template <class Number>
+using Plain = std::conditional_t<std::is_same_v<Number, Lanes>, double, Number>;
+
+/// Side number `index` of a frustum, lengths scaled by 2^-exponent; mirrored to x > 0 if it lies on the other
+/// side.
+template <class Real, int Sides>
+FrustumSide<Real> side_of(const View<Sides>& given, int index, int exponent) {
+    const Real view = std::scalbn(Real(given.near), -exponent);
+    const bool mirrored = given.high[index] < 0.0;
+    const Real low = std::scalbn(Real(mirrored ? -given.high[index] : given.low[index]), -exponent);
+    const Real high = std::scalbn(Real(mirrored ? -given.low[index] : given.high[index]), -exponent);
+    const Real place = index == 0 ? 1.0 : 3.0, high_code = mirrored ? 2.0 : 1.0;
+    return {.low_slope = low / view,
+            .high_slope = high / view,
+            .low = low,
+            .high = high,
+            .low_room = 1 / (std::fabs(low) + view),
+            .high_room = 1 / (std::fabs(high) + view),
+            .low_code = place * (3 - high_code),
+            .high_code = place * high_code,
+            .window = low > 0.0      ? Window::beyond
+                      : low == -high ? Window::centred
+                                     : Window::around,
+            .mirror = mirrored ? -1.0 : 1.0};
+}
+
+/// The same numbers in every lane.
+FrustumSide<Lanes> spread(const FrustumSide<double>& side) {
+    return {side.low_slope, side.high_slope, side.low,       side.high,   side.low_room,
+            side.high_room, side.low_code,   side.high_code, side.window, side.mirror};
+}
+FrustumSide<long double> spread(const FrustumSide<long double>& side) { return side; }
+
+/// Root for choice s of S and t of T.  Choices count the sides like digits, the first side fastest.
+template <class Number, int Sides>
+DepthRoot<Number, Sides> root_of(const FrustumSide<Plain<Number>> (&sides)[Sides], Plain<Number> view, int s,
+                                 int t) {
+    using Real = Plain<Number>;
+    // In units of view: (view^2 z + view sum k x) / (view^2 + sum k^2).
+    Real sum[Sides], squares = view * view, code = 0.0;
+    for (int i = 0; i < Sides; ++i) {
+        const FrustumSide<Real>& side = sides[i];
+        const int s_choices = min_choices(side.window), t_choices = max_choices(side.window);
+        // S: no slope, the low one if it is of the first kind, the high one.  T: no slope, the low one.
+        const bool low = (s_choices == 3 && s % s_choices == 1) || t % t_choices == 1;
+        const bool high = s % s_choices == s_choices - 1;
+        s /= s_choices;
+        t /= t_choices;
+        const Real low_part = low ? side.low : Real(0.0), high_part = high ? side.high : Real(0.0);
+        sum[i] = low_part + high_part;
+        squares += low_part * low_part + high_part * high_part;
+        code += (low ? side.low_code : Real(0.0)) + (high ? side.high_code : Real(0.0));
+    }
+    DepthRoot<Number, Sides> root;
+    root.depth = view * view / squares;
+    for (int i = 0; i < Sides; ++i) root.side[i] = view * sum[i] / squares;
+    root.code = code;
+    return root;
+}
+
+/// Gram matrix of the axes minus the identity.
 template <class Real, int Size>
 Rows<Real, Size> gram_defect(const Rows<double, Size>& axes) {
     Rows<Real, Size> defect;
@@ -37,45 +102,42 @@ Rows<Real, Size> gram_defect(const Rows<double, Size>& axes) {
 }  // namespace
 
 template <class Number, int Sides>
-DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
-    using Real = std::conditional_t<std::is_same_v<Number, Lanes>, double, Number>;
+DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
+    using Real = Plain<Number>;
     DistanceFrame<Number, Sides> frame;
-    const int exponent = std::ilogb(view.near);
-    const Real scaled_near = std::scalbn(Real(view.near), -exponent);
-    const auto dual = dual_basis<Real>(view.axes);
-    const auto defect = gram_defect<Real>(view.axes);
-    Real low[Sides], high[Sides], mirror[Sides + 1];
+    const int exponent = std::ilogb(given.near);
+    const Real view = std::scalbn(Real(given.near), -exponent);
+    frame.view = view;
+    frame.near = Real(given.near);
+    frame.far = Real(given.far);
+
+    FrustumSide<Real> sides[Sides];
+    Real mirror[Sides + 1];
+    mirror[Sides] = 1.0;
     bool all_centred = true;
     for (int i = 0; i < Sides; ++i) {
-        // A window beyond the axis is mirrored to the positive side, if need be.
-        const bool mirrored = view.high[i] < 0.0;
-        mirror[i] = mirrored ? -1.0 : 1.0;
-        low[i] = std::scalbn(Real(mirrored ? -view.high[i] : view.low[i]), -exponent);
-        high[i] = std::scalbn(Real(mirrored ? -view.low[i] : view.high[i]), -exponent);
-        frame.window[i] = low[i] > 0.0         ? Window::beyond
-                          : low[i] == -high[i] ? Window::centred
-                                               : Window::around;
-        all_centred &= frame.window[i] == Window::centred;
-        const Real left_code = i == 0 ? 1.0 : 3.0, right_code = 2.0 * left_code;
-        frame.high_code[i] = mirrored ? right_code : left_code;
-        frame.low_code[i] = mirrored ? left_code : right_code;
-        frame.low[i] = low[i];
-        frame.high[i] = high[i];
-        frame.low_slope[i] = low[i] / scaled_near;
-        frame.high_slope[i] = high[i] / scaled_near;
-        frame.low_room[i] = 1 / (std::fabs(low[i]) + scaled_near);
-        frame.high_room[i] = 1 / (std::fabs(high[i]) + scaled_near);
+        sides[i] = side_of<Real>(given, i, exponent);
+        mirror[i] = sides[i].mirror;
+        all_centred &= sides[i].window == Window::centred;
     }
-    mirror[Sides] = 1.0;
-    frame.view = scaled_near;
-    frame.near = Real(view.near);
-    frame.far = Real(view.far);
+    int s_count = 1, t_count = 1;
+    for (int i = 0; i < Sides; ++i) {
+        if (sides[i].window == Window::centred && !all_centred) sides[i].window = Window::around;
+        s_count *= min_choices(sides[i].window);
+        t_count *= max_choices(sides[i].window);
+        frame.side[i] = spread(sides[i]);
+    }
+    for (int k = 0; k < s_count * t_count; ++k) {
+        frame.roots[k] = root_of<Number>(sides, view, k / t_count, k % t_count);
+    }
 
+    const auto dual = dual_basis<Real>(given.axes);
+    const auto defect = gram_defect<Real>(given.axes);
     Real squares = 0.0;
     for (int i = 0; i <= Sides; ++i) {
-        frame.origin[i] = Real(view.origin[i]);
+        frame.origin[i] = Real(given.origin[i]);
         for (int k = 0; k <= Sides; ++k) {
-            frame.axes.row[i][k] = mirror[i] * view.axes.row[i][k];
+            frame.axes.row[i][k] = mirror[i] * given.axes.row[i][k];
             frame.dual.row[i][k] = mirror[i] * dual.row[i][k];
             frame.defect.row[i][k] = mirror[i] * mirror[k] * defect.row[i][k];
             squares += defect.row[i][k] * defect.row[i][k];
@@ -88,95 +150,54 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view) {
         ++frame.refinements;
     }
     frame.relative_error = Real(kDistanceError + 2.0 * remaining);
-
-    // Roots in the order in which `project` counts them: S of side 0 fastest, then S of side 1; T likewise
-    // within.
-    int min_count[2] = {1, 1}, max_count[2] = {1, 1};
-    for (int i = 0; i < Sides; ++i) {
-        if (!all_centred && frame.window[i] == Window::centred)
-            frame.window[i] = Window::around;  // see with_windows
-        min_count[i] = min_choices(frame.window[i]);
-        max_count[i] = max_choices(frame.window[i]);
-    }
-    const int s_count = min_count[0] * min_count[1], t_count = max_count[0] * max_count[1];
-    for (int s = 0; s < s_count; ++s) {
-        for (int t = 0; t < t_count; ++t) {
-            const int from_s[2] = {s % min_count[0], s / min_count[0]},
-                      from_t[2] = {t % max_count[0], t / max_count[0]};
-            // In units of scaled_near: (near^2 z + near sum k x) / (near^2 + sum k^2).
-            Real side[2] = {0.0, 0.0}, total = scaled_near * scaled_near;
-            auto& root = frame.roots[s * t_count + t];
-            root.code = 0.0;
-            for (int i = 0; i < Sides; ++i) {
-                // S holds no slope, the low one or the high one, in this order as far as the window has them;
-                // T none or low.
-                const bool low_in_s = from_s[i] == 1 && min_count[i] == 3,
-                           high_in_s = from_s[i] > 0 && !low_in_s;
-                if (low_in_s || from_t[i] > 0) {
-                    side[i] += low[i];
-                    total += low[i] * low[i];
-                    root.code = root.code + frame.low_code[i];
-                }
-                if (high_in_s) {
-                    side[i] += high[i];
-                    total += high[i] * high[i];
-                    root.code = root.code + frame.high_code[i];
-                }
-            }
-            root.depth = scaled_near * scaled_near / total;
-            for (int i = 0; i < Sides; ++i) root.side[i] = scaled_near * side[i] / total;
-        }
-    }
     return frame;
 }
-
-// Depths and windows in these ranges, and slopes (window over near) up to kLargestSlope, keep what is formed
-// of them in the normal range of double: squares of slopes (2^400), and lengths times slopes (2^700).
-constexpr double kSmallestDepth = 0x1p-400;
-constexpr double kLargestDepth = 0x1p500;
-constexpr double kLargestWindow = 0x1p400;
-constexpr double kLargestSlope = 0x1p200;
 
 template <int Sides>
 bool is_ordinary(const View<Sides>& view) {
     double window = 0.0;
-    for (int i = 0; i < Sides; ++i)
+    for (int i = 0; i < Sides; ++i) {
         window = std::max({window, std::fabs(view.low[i]), std::fabs(view.high[i])});
-    return view.near >= kSmallestDepth && view.far <= kLargestDepth && window <= kLargestWindow &&
-           window <= kLargestSlope * view.near;
+    }
+    return view.near >= 0x1p-400 && view.far <= 0x1p500 && window <= 0x1p400 && window <= 0x1p200 * view.near;
 }
 
 namespace {
 
-/// Region by the root that decides the depth.  For very steep sides the point found may be on a side in exact
-/// arithmetic only, by a part of its coordinates far below roundoff.
+/// Region by the root that decides the depth.  The point found may lie on a very steep side in exact
+/// arithmetic only, since it is off by a part of its coordinates far below roundoff.
 template <class Kinds, int Sides>
-long double region_of_depth(const DistanceFrame<long double, Sides>& frame,
-                            const Coordinates<long double, Sides>& p) {
-    const auto depth_of = [&](const auto& root) {
+int region_of_depth(const DistanceFrame<long double, Sides>& frame,
+                    const Coordinates<long double, Sides>& p) {
+    const auto depth_of = [&](const DepthRoot<long double, Sides>& root) {
         long double depth = root.depth * p.at[Sides];
         for (int i = 0; i < Sides; ++i) {
             depth += root.side[i] * (Kinds::kKind[i] == Window::centred ? std::fabs(p.at[i]) : p.at[i]);
         }
         return depth;
     };
-    const auto* deepest = &frame.roots[0];
-    for (int s = 0; s < Kinds::kMin; ++s) {
-        const auto* const first = &frame.roots[s * Kinds::kMax];
-        const auto* const least =
-            std::min_element(first, first + Kinds::kMax,
-                             [&](const auto& a, const auto& b) { return depth_of(a) < depth_of(b); });
-        if (s == 0 || depth_of(*least) > depth_of(*deepest)) deepest = least;
+    const auto less_deep = [&](const auto& a, const auto& b) { return depth_of(a) < depth_of(b); };
+    const auto* deepest = std::min_element(frame.roots, frame.roots + Kinds::kMax, less_deep);
+    for (int s = 1; s < Kinds::kMin; ++s) {
+        const auto* const first = frame.roots + s * Kinds::kMax;
+        const auto* const least = std::min_element(first, first + Kinds::kMax, less_deep);
+        if (less_deep(*deepest, *least)) deepest = least;
     }
     const int code = static_cast<int>(deepest->code);
     int region = 0;
     for (int i = 0, place = 1; i < Sides; ++i, place *= 3) {
         const int digit = code / place % 3;
-        // A centred window has roots for positive x, where the code is 1.
-        const bool other = Kinds::kKind[i] == Window::centred && digit > 0 && p.at[i] < 0.0L;
+        // A centred window has roots for positive x only, where the digit is 1.
+        const bool other = Kinds::kKind[i] == Window::centred && digit == 1 && p.at[i] < 0.0L;
         region += place * (other ? 2 : digit);
     }
     return region;
+}
+
+/// The greatest double that is not above x.
+double round_down(long double x) {
+    const double rounded = static_cast<double>(x);
+    return rounded > x ? next_down(rounded) : rounded;
 }
 
 template <class Kinds, int Sides>
@@ -185,19 +206,14 @@ PointDistance<Sides> nearest_point(const DistanceFrame<long double, Sides>& fram
     for (int k = 0; k <= Sides; ++k) position[k] = point[k];
     const auto found = distance_to_frustum<Kinds, true>(frame, position);
     const auto nearest = nearest_in_world(frame, position, found);
-    // Rounded outwards: the nearest double, then one step if that went the wrong way.
-    const auto below = [](long double x) {
-        const double rounded = static_cast<double>(x);
-        return rounded > x ? std::nextafter(rounded, -std::numeric_limits<double>::infinity()) : rounded;
-    };
-    PointDistance<Sides> answer{};
-    answer.distance = static_cast<double>(found.distance);
-    answer.lower = below(found.lower);
-    answer.upper = -below(-found.upper);
-    answer.region =
-        static_cast<std::uint8_t>(found.region > 0.0L || found.distance <= 0.0L
-                                      ? found.region
-                                      : region_of_depth<Kinds>(frame, to_frustum(frame, position)));
+    const bool lost = found.distance > 0.0L && found.region <= 0.0L;
+    const int region =
+        lost ? region_of_depth<Kinds>(frame, to_frustum(frame, position)) : static_cast<int>(found.region);
+    PointDistance<Sides> answer{static_cast<double>(found.distance),
+                                round_down(found.lower),
+                                -round_down(-found.upper),
+                                static_cast<std::uint8_t>(region),
+                                {}};
     for (int k = 0; k <= Sides; ++k) answer.nearest[k] = static_cast<double>(nearest.at[k]);
     return answer;
 }

@@ -6,28 +6,24 @@
 // regions; book sections 6.3.3 and 10.4.3 repeat it.  Here the same regions come out of one closed form
 // without branches.
 //
-//        far   +-----------------------------+       At depth t the frustum is the window low t <= x <= high
-//        t,
-//               \        .                  /        so the squared distance to that slice is
-//                \      . t                /
-//           -----------x------- P         /          (t - z)^2 + sum over sides of excess(x, [low t, high
-//           t])^2,
-//                  \                     /
-//            near   +-------------------+            convex in t.  Half its derivative is increasing and
-//            consists of
-//                         .                          straight pieces:
+//      far  +-----------------------------+     At depth t the frustum is the window low t <= x <= high t,
+//            \        .                  /      so the squared distance to that slice is
+//             \      . t                /
+//        -----------x------- P         /          (t - z)^2 + sum over sides (excess of x over it)^2,
+//               \                     /
+//         near   +-------------------+          convex in t.  Half its derivative consists of increasing
+//                         .                     straight pieces:
 //                         E
 //     psi(t) = t - z + sum over sides of  low max(low t - x, 0) - high max(x - high t, 0).
 //
-// For a slope k, the piece k (k t - x) is cut off at 0 from above where the window widens away from the axis
-// (min(0, .)), from below where it lies beyond the axis and moves towards the point (max(0, .), only the
-// inner slope of an off-centre window).  So psi = min over S max over T of (t - z + sum over slopes in S and
-// T of k (k t - x)), with S and T subsets of those slopes, and its root is
+// For a slope k, the piece k (k t - x) is cut off at 0 from above where the window widens away from the axis,
+// min(0, .); and from below, max(0, .), at the inner slope of a window that lies beyond the axis.  So
 //
-//     t* = max over S min over T of  (z + sum k x) / (1 + sum k^2).
+//     psi = min over S max over T of (t - z + sum of k (k t - x) over the slopes k in S and T),
+//     t*  = max over S min over T of (z + sum k x) / (1 + sum k^2), clamped to [near, far],
 //
-// clamped to [near, far].  For windows around the axis there is no T.  No point is near both slopes of a
-// side, so S and T hold at most one slope of a side each.
+// where S and T run over subsets of the slopes of the first and of the second kind.  A point cannot be near
+// both slopes of a side, so S and T need at most one slope of a side each.
 #pragma once
 
 #include <cmath>
@@ -37,8 +33,8 @@
 
 namespace geomsrv {
 
-/// A frustum as its numbers: `Sides` is 2 in space (L, U), 1 in the plane (L); coordinate `Sides` is the
-/// depth along D.
+/// A frustum as its numbers.  `Sides` is 2 in space (L, U), 1 in the plane (L); coordinate number `Sides` is
+/// the depth along D.
 template <int Sides>
 struct View {
     static constexpr int kDimension = Sides + 1;
@@ -55,7 +51,7 @@ enum class Window : std::uint8_t {
     beyond,   ///< 0 < low; mirrored if need be
 };
 
-/// How many choices S has for a side (no slope, or one), and T.
+/// How many choices S has for a side (no slope, or one of them), and T.
 constexpr int min_choices(Window window) { return window == Window::around ? 3 : 2; }
 constexpr int max_choices(Window window) { return window == Window::beyond ? 2 : 1; }
 
@@ -66,30 +62,39 @@ struct Windows {
     static constexpr int kMin = (min_choices(Kind) * ...), kMax = (max_choices(Kind) * ...);
 };
 
+/// One side of a frustum: low_slope t <= x <= high_slope t at depth t.
+template <class Number>
+struct FrustumSide {
+    Number low_slope, high_slope;
+    Number low, high;            ///< the slopes times `view`
+    Number low_room, high_room;  ///< 1 / (|low| + view), 1 / (|high| + view)
+    Number low_code, high_code;  ///< what being beyond low, high adds to the region
+    Window window;
+    double mirror;  ///< -1 if x is minus the coordinate along the given axis
+};
+
+/// Candidate for the depth of the nearest point, one choice of S and T: depth z + sum side[i] x[i].
+template <class Number, int Sides>
+struct DepthRoot {
+    Number depth, side[Sides];
+    Number code;  ///< region of the sides whose slopes are in S and T
+};
+
 /// A frustum prepared for distances.  `Number` is Lanes, with every lane the same, or long double where a
 /// product might leave the range of double.
 template <class Number, int Sides>
 struct DistanceFrame {
     static constexpr int kDimension = Sides + 1;
     static constexpr int kMaxRoots = Sides == 2 ? 16 : 4;
-    /// Candidate for the depth of the nearest point: depth * z + sum side[i] * x[i].
-    struct Root {
-        Number depth, side[Sides];
-        Number code;  ///< region of the sides whose slopes are in S and T
-    };
-
     Number origin[kDimension];
     Rows<Number, kDimension> axes;    ///< literal, but negated where the window was mirrored
     Rows<Number, kDimension> dual;    ///< world to frustum coordinates
     Rows<Number, kDimension> defect;  ///< Gram matrix of the axes minus the identity
-    Number low_slope[Sides], high_slope[Sides];
-    Number low[Sides], high[Sides], view;  ///< the same slopes as low / view, high / view, scaled to about 1
-    Number low_room[Sides], high_room[Sides];  ///< 1 / (|low| + view), 1 / (|high| + view)
-    Number near, far;
-    Root roots[kMaxRoots];
-    Number low_code[Sides], high_code[Sides];  ///< what being beyond low, high adds to the region
-    Number relative_error;                     ///< of a distance; see kLowerError for the rest
-    Window window[Sides];
+    FrustumSide<Number> side[Sides];
+    Number view;                                ///< near, scaled to [1, 2)
+    Number near, far;                           ///< [m]
+    DepthRoot<Number, Sides> roots[kMaxRoots];  ///< T fastest, then S
+    Number relative_error;                      ///< of a distance; see kLowerError for the rest
     int refinements = 0;  ///< projections needed after the first, see `distance_to_frustum`
 };
 
@@ -100,25 +105,22 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& view);
 template <int Sides>
 bool is_ordinary(const View<Sides>& view);
 
-/// call(Windows<...>{}) for the windows of a frame.  Two centred windows are worth a kernel; one is not.
+/// call(Windows<...>{}) for the windows of a frame.  Two centred windows are worth a kernel, one is not.
 template <class Number, class Call>
 auto with_windows(const DistanceFrame<Number, 1>& frame, Call call) {
-    switch (frame.window[0]) {
-        case Window::centred:
-            return call(Windows<Window::centred>{});
-        case Window::around:
-            return call(Windows<Window::around>{});
-        default:
-            return call(Windows<Window::beyond>{});
-    }
+    const Window window = frame.side[0].window;
+    if (window == Window::centred) return call(Windows<Window::centred>{});
+    if (window == Window::around) return call(Windows<Window::around>{});
+    return call(Windows<Window::beyond>{});
 }
 template <class Number, class Call>
 auto with_windows(const DistanceFrame<Number, 2>& frame, Call call) {
-    const bool beyond0 = frame.window[0] == Window::beyond, beyond1 = frame.window[1] == Window::beyond;
-    if (beyond0 && beyond1) return call(Windows<Window::beyond, Window::beyond>{});
-    if (beyond0) return call(Windows<Window::beyond, Window::around>{});
-    if (beyond1) return call(Windows<Window::around, Window::beyond>{});
-    if (frame.window[0] == Window::around) return call(Windows<Window::around, Window::around>{});
+    const Window left = frame.side[0].window, up = frame.side[1].window;
+    if (left == Window::beyond && up == Window::beyond)
+        return call(Windows<Window::beyond, Window::beyond>{});
+    if (left == Window::beyond) return call(Windows<Window::beyond, Window::around>{});
+    if (up == Window::beyond) return call(Windows<Window::around, Window::beyond>{});
+    if (left == Window::around) return call(Windows<Window::around, Window::around>{});
     return call(Windows<Window::centred, Window::centred>{});
 }
 
@@ -148,11 +150,12 @@ struct Projection {
     Number region;  ///< FrustumRegion, a small whole number
 };
 
-/// Nearest point of the frustum in the metric in which L, U, D are orthonormal.
+/// Nearest point of the frustum in the metric in which L, U, D are orthonormal.  On the border of regions the
+/// feature of least dimension is named: the smallest one that holds the nearest point.
 template <class Kinds, class Number, int Sides>
 GEOMSRV_INLINE Projection<Number, Sides> project(const DistanceFrame<Number, Sides>& frame,
                                                  const Coordinates<Number, Sides>& p) {
-    const Number z = p.at[Sides];
+    const Number z = p.at[Sides], near = frame.near, far = frame.far, none = 0.0;
     Number x[Sides];
     for (int i = 0; i < Sides; ++i) x[i] = Kinds::kKind[i] == Window::centred ? magnitude(p.at[i]) : p.at[i];
     Number root = z;
@@ -168,17 +171,17 @@ GEOMSRV_INLINE Projection<Number, Sides> project(const DistanceFrame<Number, Sid
         });
         root = s == 0 ? lowest : greater(root, lowest);
     });
-    const Number near = frame.near, far = frame.far, none = 0.0;
     Projection<Number, Sides> found;
     const Number depth = lesser(greater(root, near), far);
     found.nearest.at[Sides] = depth;
     found.region = select(root <= near, Number(9.0), select(far <= root, Number(18.0), none));
     for (int i = 0; i < Sides; ++i) {
-        const Number high = frame.high_slope[i] * depth;
-        const Number low = Kinds::kKind[i] == Window::centred ? -high : frame.low_slope[i] * depth;
+        const FrustumSide<Number>& side = frame.side[i];
+        const Number high = side.high_slope * depth;
+        const Number low = Kinds::kKind[i] == Window::centred ? -high : side.low_slope * depth;
+        const Number beyond_high = select(high <= p.at[i], side.high_code, none);
         found.nearest.at[i] = lesser(greater(p.at[i], low), high);
-        found.region = found.region + select(p.at[i] <= low, frame.low_code[i],
-                                             select(high <= p.at[i], frame.high_code[i], none));
+        found.region = found.region + select(p.at[i] <= low, side.low_code, beyond_high);
     }
     return found;
 }
@@ -196,38 +199,35 @@ struct NearestPoint {
     Mask<Number> in_range;  ///< nothing overflowed, underflowed, or was lost to rounding altogether
 };
 
-// Errors of a distance, in units u of roundoff; c is the point in frustum coordinates, |c| its length, at
-// most the reach |c_0| + |c_1| + |c_2|; d the distance.
+// Errors of a distance, in units u of roundoff.  c is the point in frustum coordinates, |c| its length, at
+// most the reach |c_0| + |c_1| + |c_2|; d is the distance.
 //
-// 1. Coordinates: 13 u sum |dual| |P - E| each (9 dual basis, 1 difference, 1 product, 2 sums); as a vector
-// at most
-//    13 sqrt(3) 1.04 u |c| <= 23.4 u |c|.
-// 2. Depth: a root r = (z + sum k x) / (1 + sum k^2) is off by at most 11 u of the sum of magnitudes of its
-// terms (8 in
-//    the coefficients, 1 product, 2 sums), and a shift of c by 11 u |c| along its gradient undoes that.  The
-//    depth found is the max over S min over T of such roots, hence the exact one for a point c' near c: where
-//    the slopes that are active at that depth are those of S, T the shift does it; where one becomes inactive
-//    on the way, its coordinate stays at the border and the others go on.  Each side coordinate moves by at
-//    most 11 u |c|, and so do the rest together: |c' - c| <= 11 sqrt(3) u |c| <= 19.1 u |c|.  Projection does
+// 1. Coordinates: 13 u sum |dual| |P - E| each (9 dual basis, 1 difference, 1 product, 2 sums), as a vector
+//    at most 13 sqrt(3) 1.04 u |c| <= 23.4 u |c|.
+// 2. Depth.  A root (z + sum k x) / (1 + sum k^2) is off by at most 11 u times the magnitudes of its terms
+//    (8 coefficients, 1 product, 2 sums), and moving c by 11 u |c| along the gradient undoes that.  The depth
+//    found is the max over S of the min over T of such roots, hence the exact one for some c' near c: where
+//    the slopes active at that depth are those of S and T, that move does it; where one becomes inactive on
+//    the way, its coordinate stays at the border and the others go on.  Each side coordinate moves by at most
+//    11 u |c|, and so do the others together: |c' - c| <= 11 sqrt(3) u |c| <= 19.1 u |c|.  Projection does
 //    not expand, so the point found at that depth is within 2 * 19.1 u |c| of the nearest one.
 // 3. Its side coordinates are rounded by 2 u each (slope, product), at most 2 u (|c| + d).
 // 4. Differences, squares, sum, root: 4 u d.
 //
 // The point found is a point of the frustum but for 3, so above only 1, 3 and 4 count: 26 u |c| + 6 u d;
-// below all of them: 64 u |c| + 6 u d.  Axes off orthonormal enlarge part 2 and 3 by 1.05 and part 4 by 1 u.
-// Rounded up for second-order terms and the rounding of the bounds.
+// below all of them: 64 u |c| + 6 u d.  Axes off orthonormal enlarge 2 and 3 by 1.05 and 4 by 1 u.  Rounded
+// up for second-order terms and the rounding of the bounds.
 inline constexpr double kUpperError = 32.0 * kUnitRoundoff;
 inline constexpr double kLowerError = 72.0 * kUnitRoundoff;
 inline constexpr double kDistanceError = 8.0 * kUnitRoundoff;
 
-// A point is proven inside if its room exceeds the error of the room: 14 u |c| in each coordinate, 2 u in the
-// products, so
-// (|k| + 1) 16 u |c| before scaling by 1 / (|k| + 1), which adds 3 u.
+// A point is proven inside if its room exceeds the error of the room times the reach: 14 u in each coordinate
+// and 2 u in the products, so 16 u (|k| + 1) before scaling by 1 / (|k| + 1), which adds 3 u.
 inline constexpr double kRoomError = 20.0 * kUnitRoundoff;
 
-/// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not
-/// count.
-inline constexpr double kMinSquare = 0x1p-900, kMaxSquare = 0x1p1000;
+// Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not count.
+inline constexpr double kMinSquare = 0x1p-900;
+inline constexpr double kMaxSquare = 0x1p1000;
 
 /// Distance of p from its nearest point, and the interval that is proven to hold the exact value.
 template <class Kinds, bool Skewed, class Number, int Sides>
@@ -249,14 +249,15 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
     Number room = lesser(z - frame.near, frame.far - z);
     Number reach = magnitude(z);
     for (int i = 0; i < Sides; ++i) {
+        const FrustumSide<Number>& side = frame.side[i];
         const Number size = magnitude(p.at[i]);
         reach = reach + size;
         if (Kinds::kKind[i] == Window::centred) {
-            room = lesser(room, (frame.high[i] * z - frame.view * size) * frame.high_room[i]);
+            room = lesser(room, (side.high * z - frame.view * size) * side.high_room);
         } else {
             const Number x = frame.view * p.at[i];
-            room = lesser(room, (x - frame.low[i] * z) * frame.low_room[i]);
-            room = lesser(room, (frame.high[i] * z - x) * frame.high_room[i]);
+            room = lesser(room, (x - side.low * z) * side.low_room);
+            room = lesser(room, (side.high * z - x) * side.high_room);
         }
     }
     const Mask<Number> inside = none <= room;
@@ -271,6 +272,14 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
     return {distance, lower, upper, select(distance <= none, none, region), offset, inside, in_range};
 }
 
+/// The whole query.  `Skewed` is for axes that are off orthonormal by more than rounding: the literal frustum
+/// is then an orthogonal one in frustum coordinates c, but lengths are those of the Gram matrix I + defect.
+/// Its nearest point y is the fixed point of
+///
+///     y  ->  orthogonal projection of  c + defect (c - y),
+///
+/// since the gradient of the squared distance, (I + defect) (c - y), has to be normal to the frustum at y.
+/// Projections do not expand, so each step brings y nearer by a factor of at most |defect| <= 0.03.
 template <class Kinds, bool Skewed, class Number, int Sides>
 GEOMSRV_INLINE NearestPoint<Number, Sides> distance_to_frustum(const DistanceFrame<Number, Sides>& frame,
                                                                const Number (&point)[Sides + 1]) {
