@@ -59,7 +59,7 @@ def floats(
         raise GeometryError(f"{name} must hold real numbers, got dtype {given.dtype}")
     if given.dtype.itemsize > 8:
         raise GeometryError(f"{name} must be representable in float64, got dtype {given.dtype}")
-    if given.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, given.shape, strict=True)):
+    if not _has_shape(given, shape):
         wanted = f"have shape {shape_text(shape)}" if shape else "be a single number"
         raise GeometryError(f"{name} must {wanted}, got shape {given.shape}")
     numbers = np.asarray(given, dtype=np.float64, order="C")
@@ -71,6 +71,15 @@ def floats(
     if bad >= 0:
         raise GeometryError(f"{name}{_where(numbers, bad)} is {numbers.reshape(-1)[bad]}, must be finite")
     return numbers
+
+
+def _has_shape(given: NDArray[Any], shape: tuple[int | None, ...]) -> bool:
+    if given.ndim != len(shape):
+        return False
+    for want, got in zip(shape, given.shape, strict=True):
+        if want is not None and want != got:
+            return False
+    return True
 
 
 def _where(array: NDArray[Any], flat_index: int) -> str:
@@ -97,6 +106,8 @@ def offsets(value: Any, name: str, total: int, minimum_count: int) -> NDArray[np
         raise GeometryError(f"{name} must hold integers, got dtype {given.dtype}")
     if given.ndim != 1 or len(given) < 1:
         raise GeometryError(f"{name} must have shape (n + 1,), got {given.shape}")
+    if len(given) <= ONE_BY_ONE and _rising(given.tolist(), total, minimum_count):
+        return np.ascontiguousarray(given, dtype=np.int64)
     if given[0] != 0 or given[-1] != total:
         raise GeometryError(f"{name} must run from 0 to {total}, got {given[0]} to {given[-1]}")
     # Before any subtraction: differences of huge offsets wrap around to plausible counts.
@@ -110,6 +121,12 @@ def offsets(value: Any, name: str, total: int, minimum_count: int) -> NDArray[np
         i = int(np.argmax(counts < minimum_count))
         raise GeometryError(f"{name}: item {i} has {counts[i]} vertices, needs at least {minimum_count}")
     return ends
+
+
+def _rising(ends: list[int], total: int, minimum_count: int) -> bool:
+    """What `offsets` asks."""
+    steps = zip(ends, ends[1:], strict=False)
+    return ends[0] == 0 and ends[-1] == total and all(0 <= a and b - a >= minimum_count for a, b in steps)
 
 
 def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
