@@ -16,10 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geomsrv.answers import Distances, DistanceStatus
 from geomsrv.config import Config
 from geomsrv.crosscheck import CrossCheck
-from geomsrv.narrow_phase import relative_poses
 from geomsrv.pairwise import ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
@@ -249,33 +247,9 @@ class Engine:
 
     def check(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> None:
         """Hand distances of (n, 2) rows of `world` to the cross-check, if it is on."""
-        if self.config.cross_check_mode == "off":
-            return
-        rows = np.flatnonzero(answer.status != DistanceStatus.UNSUPPORTED)
-        pairs, shapes, ids = pairs[rows], [world.table.shapes[k] for k in world.shape.tolist()], world.ids
-        # The cross-check wants what the query got and gave: everything in the frame of a.
-        turn, origin = world.rotations[pairs[:, 0]], world.poses[pairs[:, 0], :3]
-
-        def local(vectors: FloatArray) -> FloatArray:
-            turned: FloatArray = np.einsum("kji,kj->ki", turn, vectors)
-            return turned
-
-        self.cross_check.submit(
-            [(shapes[i], shapes[j]) for i, j in pairs.tolist()],
-            relative_poses(world, pairs),
-            Distances(
-                distance=answer.distance[rows],
-                lower=answer.lower[rows],
-                upper=answer.upper[rows],
-                point_b=local(answer.point_b[rows] - origin),
-                status=answer.status[rows],
-                cost=answer.cost,
-                _point_a=local(answer.point_a[rows] - origin),
-                _normal=local(answer.normal[rows]),
-            ),
-            [f"{ids[i]} {ids[j]}" for i, j in pairs.tolist()],
-        )
-        self.counters["cross_check"] += 1
+        if self.config.cross_check_mode != "off":
+            self.counters["cross_check"] += 1
+            self.cross_check.submit_pairs(world, pairs, answer)
 
 
 def _stage(name: str, *obstacles: tuple[bool, str]) -> Stage:

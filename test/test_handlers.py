@@ -581,13 +581,12 @@ def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     desk = Desk()
     taken = []
     monkeypatch.setattr(desk.engine, "config", Config(cross_check_mode="all"))
-    monkeypatch.setattr(desk.engine.cross_check, "submit", lambda *arguments: taken.append(arguments))
-    turned = gs.SceneObject("turned", gs.Box([1, 1, 1]), (0, 5, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5)))
-    desk.engine.apply(gs.SceneUpdate(add=[turned]))
-    desk.ask("Distance", select=BY_IDS, ids_a=["turned", "ball"], ids_b=["ball", "cone"])
-    ((pairs, poses, answers, labels),) = taken
-    assert labels == ["turned ball"], "unsupported pairs are none of its business"
-    assert [type(shape) for shape in pairs[0]] == [gs.Box, gs.Sphere]
-    again = gs.distance(*pairs[0], poses)
-    assert np.allclose(again.distance, answers.distance) and np.allclose(again.point_a, answers.point_a)
-    assert np.allclose(again.point_b, answers.point_b) and np.allclose(again.normal, answers.normal)
+    for name in ("submit_pairs", "submit_scene"):
+        monkeypatch.setattr(desk.engine.cross_check, name, lambda *arguments: taken.append(arguments))
+    desk.ask("Distance", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "cone"])
+    ((world, pairs, answer),) = taken
+    assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "cone"]]
+    assert answer.status.tolist() == [0, 2] and len(answer.distance) == 2
+    desk.ask("Distance", select=ALL, max_distance=1.0)
+    scene, near = taken[1]
+    assert scene is desk.engine.scene and near.ids_a == ["ball"] and near.version == scene.version

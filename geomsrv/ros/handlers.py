@@ -21,7 +21,7 @@ from geomsrv import _validate, queries
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
-from geomsrv.pairwise import Bodies, ListedContacts, ListedDistances, listed_distances, listed_first_contacts, world_of
+from geomsrv.pairwise import Bodies, ListedContacts, listed_distances, listed_first_contacts, world_of
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
@@ -239,22 +239,21 @@ class Handlers:
 
     def _all_distances(self, request: Any, response: Any, want: tuple[str, ...], accuracy: str) -> None:
         """Every pair within max_distance, nearest first, then those that are unsupported."""
-        world = self.engine.scene.world
-        near = self.engine.scene.distances(request.max_distance, want=want, accuracy=accuracy)
-        pairs = [(world.index[a], world.index[b]) for a, b in zip(near.ids_a, near.ids_b, strict=True)]
-        order = np.argsort(near.distance, kind="stable")
-        found = _pairs_array(pairs)[order]
-        missing = _pairs_array([(world.index[a], world.index[b]) for a, b, _ in near.unsupported])
-        _set_ids(response, world, np.concatenate([found, missing]))
-        answer = ListedDistances(
-            status=_extended(near.status[order], len(missing), DistanceStatus.UNSUPPORTED),
-            **{name: _extended(getattr(near, name)[order], len(missing), np.nan) for name in _DISTANCE_COLUMNS},
-            message=near.message,
-            cost=near.cost,
-        )
-        self.engine.check(world, np.concatenate([found, missing]), answer)
-        _set_distances(response, answer, want)
-        _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, note=near.message)
+        engine = self.engine
+        near = engine.scene.distances(request.max_distance, want=want, accuracy=accuracy)
+        if engine.config.cross_check_mode != "off":
+            engine.cross_check.submit_scene(engine.scene, near)
+        order, missing = np.argsort(near.distance, kind="stable"), near.unsupported
+        ids_a, ids_b, rows = near.ids_a, near.ids_b, order.tolist()
+        response.ids_a = [ids_a[i] for i in rows] + [a for a, _, _ in missing]
+        response.ids_b = [ids_b[i] for i in rows] + [b for _, b, _ in missing]
+        response.scene_version = near.version
+        response.item_status = convert.bytes_(_extended(near.status[order], len(missing), DistanceStatus.UNSUPPORTED))
+        for name in _distance_columns(want):
+            column = _extended(getattr(near, name)[order], len(missing), np.nan)
+            setattr(response, name, convert.doubles(column))
+        convert.set_cost(response.cost, near.cost)
+        response.status, response.message = UNSUPPORTED if missing else OK, near.message
 
     @_answered()
     def first_contact(self, request: Any, response: Any) -> None:
@@ -480,12 +479,18 @@ _DISTANCE_COLUMNS = ("distance", "lower", "upper", "point_a", "point_b", "normal
 _CONTACT_COLUMNS = ("time", "time_lower", "time_upper", "last_time", "normal")
 
 
+def _distance_columns(want: tuple[str, ...]) -> tuple[str, ...]:
+    return _DISTANCE_COLUMNS if "witness" in want else _DISTANCE_COLUMNS[:3]
+
+
 def _pairs_array(pairs: Sequence[tuple[int, int]]) -> IntArray:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def _extended(column: NDArray[Any], count: int, value: float) -> NDArray[Any]:
     """`column` with `count` more rows of `value`."""
+    if count == 0:
+        return column
     return np.concatenate([column, np.full((count, *column.shape[1:]), value, column.dtype)])
 
 
@@ -497,7 +502,7 @@ def _set_ids(response: Any, world: World, pairs: IntArray) -> None:
 
 def _set_distances(response: Any, answer: Any, want: tuple[str, ...]) -> None:
     response.item_status = convert.bytes_(answer.status)
-    for name in _DISTANCE_COLUMNS[: None if "witness" in want else 3]:
+    for name in _distance_columns(want):
         setattr(response, name, convert.doubles(getattr(answer, name)))
     convert.set_cost(response.cost, answer.cost)
 
