@@ -237,7 +237,7 @@ def polygon_distances(world: World, pairs: IntArray, penetration: bool) -> Dista
 
 def _in_space(plane: FloatArray) -> FloatArray:
     """(k, 2) -> (k, 3) with z = 0, or NaN where there is no point."""
-    return np.column_stack([plane, 0.0 * plane[:, :1]])
+    return np.column_stack([plane, 0.0 * plane[:, :1] + 0.0])
 
 
 def _widened(lower: FloatArray, upper: FloatArray, by: FloatArray, signed: bool) -> tuple[FloatArray, FloatArray]:
