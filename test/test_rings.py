@@ -119,8 +119,9 @@ def test_rotated_convex_rings_pass():
             points += [a] * int(rng.integers(1, 3)) + [
                 a + (b - a) * t for t in sorted(rng.choice([0.25, 0.5, 0.75], 2))
             ]
-        if rng.random() < 0.2:  # a segment, there and back
-            points = [ring[0] + t * (ring[1] - ring[0]) for t in [0, 0.25, 0.5, 1, 0.75, 0.25]]
+        if rng.random() < 0.2:  # a segment, there and back, or more than once
+            order = [[0, 0.25, 0.5, 1, 0.75, 0.25], [0, 1, 0.25, 0.75, 0.5], [0.5, 0, 1, 0, 1]]
+            points = [ring[0] + t * (ring[1] - ring[0]) for t in order[int(rng.integers(3))]]
             flat += 1
         copy = moved(rng, np.array(points), rng.choice([0.0, 1e3, 1e9]))
         distinct = [p for i, p in enumerate(copy.tolist()) if p != copy[i - 1].tolist()]
