@@ -19,6 +19,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="geomsrv", description="Geometry queries for robots that state how accurate they are."
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     commands.add_parser(
         "node", help="run the ROS 2 node; takes ROS arguments, as --ros-args -p max_rate:=50.0", add_help=False
@@ -41,6 +42,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"geomsrv node needs ROS 2, and {missing.name} is not installed", file=sys.stderr)
         return 2
     return node.main(rest)
+
+
+def _version() -> str:
+    from geomsrv._version import __version__
+
+    return str(__version__)
 
 
 def _self_check() -> int:

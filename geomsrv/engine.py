@@ -90,6 +90,8 @@ class Engine:
     counters : Counter
         How often each stage ran, by name.
     cross_check : CrossCheck
+    failing : bool
+        Whether the last evaluation raised.
     """
 
     def __init__(self, config: Config, transforms: Callable[[str], ArrayLike] | None = None) -> None:
@@ -99,6 +101,7 @@ class Engine:
         self.stamp: Any = None
         self.counters: Counter[str] = Counter()
         self.cross_check = _cross_check(config)
+        self.failing = False
 
     def configure(self, config: Config) -> None:
         """Change the configuration; the scene stays."""
@@ -206,8 +209,10 @@ class Engine:
                     found = answer(on)
                 except Exception:
                     self.counters["evaluations failed"] += 1
+                    self.failing = True
                     raise
                 yield topic, found
+        self.failing = False
 
     def _visible(self, _: frozenset[str]) -> SceneCull:
         assert self.camera is not None  # the plan says so

@@ -144,4 +144,7 @@ def test_failures_are_counted(monkeypatch) -> None:
     monkeypatch.setattr(engine.scene, "cull", broken)
     with pytest.raises(ZeroDivisionError):
         engine.evaluate(EVERYTHING)
-    assert engine.counters["evaluations failed"] == 1
+    assert engine.counters["evaluations failed"] == 1 and engine.failing
+    monkeypatch.undo()
+    engine.evaluate(EVERYTHING)
+    assert engine.counters["evaluations failed"] == 1 and not engine.failing

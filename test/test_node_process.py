@@ -152,6 +152,8 @@ def test_the_command_line() -> None:
     help_ = start("--help")
     output, _ = help_.communicate(timeout=3 * DEADLINE)
     assert help_.returncode == 0 and all(word in output for word in ("node", "demo", "self-check"))
+    version = start("--version")
+    assert version.communicate(timeout=3 * DEADLINE)[0].split()[0] == "geomsrv" and version.returncode == 0
     nothing = start()
     assert "command" in nothing.communicate(timeout=3 * DEADLINE)[0] and nothing.returncode == 2
     check = start("self-check")

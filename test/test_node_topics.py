@@ -395,3 +395,18 @@ def test_with_tf2_other_frames_are_transformed(monkeypatch) -> None:
             assert node.node._engine.camera.origin.tolist() == [10, 0, 0]
     finally:
         client.close()
+
+
+def test_a_failing_evaluation_is_diagnosed_and_survived(client, ports, inboxes, node, monkeypatch) -> None:
+    def broken(*_, **__):
+        raise ZeroDivisionError("a bug in a query")
+
+    monkeypatch.setattr(node.node._engine.scene, "first_contacts", broken)
+    ports["shapes"].publish(stamped(msg.SceneUpdate(add=[body("a", gs.Sphere(1.0))]), 6000))
+    status = diagnosis(inboxes, "engine", lambda s: s.level == b"\x02")
+    assert "failed" in status.message
+    assert client.call(srv.Distance, "distance", select=2).status == 0, "services go on"
+    monkeypatch.undo()
+    ports["shapes"].publish(stamped(msg.SceneUpdate(add=[body("b", gs.Sphere(1.0))]), 6001))
+    assert inboxes["contacts"].wait(of_time(6001)).contacts
+    diagnosis(inboxes, "engine", lambda s: s.level == b"\x00")

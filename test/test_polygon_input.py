@@ -157,5 +157,6 @@ def test_tracks() -> None:
     assert update("a", SQUARE + (9, 0), 3) == Motion(), "the same time again tells nothing"
     assert update("a", SQUARE, 1) == Motion(), "and neither does an earlier one"
     assert update("a", SQUARE[:3], 2).fault == "the motion is not a translation: 4 points became 3"
-    tracks.clear()
-    assert update("a", SQUARE, 5) == Motion()
+    tracks.forget_all_but({"a"})
+    assert update("b", SQUARE + (1, 0), 5) == Motion(), "it was forgotten"
+    assert update("a", SQUARE[:3] + (1, 0), 4).velocity == pytest.approx((0.5, 0)), "and this one was not"

@@ -107,8 +107,6 @@ class Inputs:
     def shapes(self, message: Any) -> None:
         """geomsrv/SceneUpdate."""
         self.engine.apply(convert.update_from(message), message.header.stamp)
-        if message.clear:
-            self.tracks.clear()
 
     @_input
     def states(self, message: Any) -> None:
@@ -164,6 +162,8 @@ class Inputs:
             raise GeometryError(f"z is {points[0, 2]:g}; polygons must lie in the plane z = 0 of the fixed frame")
         points, floor = points[:, :2], floor[:, :2]
         ring = convex_ring(points, floor)
+        if name not in self.engine.scene:
+            self.tracks.forget_all_but(self.engine.scene)  # it was removed, or is new: nothing is known of its motion
         motion = self.tracks.update(name, points, floor, stamp.sec * 10**9 + stamp.nanosec)
         # The origin is a corner: whoever has to assume that the polygon turns need not sweep a circle about the
         # world's origin.  Differences of float32 numbers are exact in float64, or off by 2^-29 of the floor.
@@ -181,6 +181,19 @@ class Inputs:
     @_input
     def camera_info(self, message: Any) -> None:
         """sensor_msgs/CameraInfo."""
+        self._place_camera(message)
+        self.engine.stamp = message.header.stamp
+        self._camera_info = message
+
+    def refresh_camera(self) -> None:
+        """Apply the last ~/camera_info again, after a change of parameters."""
+        if self._camera_info is not None:
+            try:
+                self._place_camera(self._camera_info)
+            except GeometryError as fault:
+                self._refuse(self.records["camera_info"], str(fault))
+
+    def _place_camera(self, message: Any) -> None:
         config, frame = self.config, message.header.frame_id
         pose: ArrayLike
         if config.camera_frame and frame == config.camera_frame:
@@ -193,13 +206,6 @@ class Inputs:
             except GeometryError as fault:
                 raise GeometryError(f"{fault}; or set camera.frame and camera.pose") from None
         self.engine.camera = convert.camera_frustum(message, pose, config.camera_near, config.camera_far)
-        self.engine.stamp = message.header.stamp
-        self._camera_info = message
-
-    def refresh_camera(self) -> None:
-        """Apply the last ~/camera_info again, after a change of parameters."""
-        if self._camera_info is not None:
-            self.camera_info(self._camera_info)
 
     @property
     def config(self) -> Config:

@@ -9,6 +9,7 @@ A callback converts, calls and converts back; what it calls is in `handlers` (se
 from __future__ import annotations
 
 import functools
+import gc
 import importlib.util
 import math
 import signal
@@ -586,6 +587,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    # What has been loaded stays; looking through it again and again would make some callbacks late.
+    gc.freeze()
     # The main thread waits for a signal; waiting for messages it would not hear one.
     spinning = threading.Thread(target=_spin, args=(executor, node, stop), name="executor")
     spinning.start()

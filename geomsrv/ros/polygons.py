@@ -8,6 +8,7 @@ translation, if some exact ring or translation lies within the floor of the numb
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -133,9 +134,9 @@ class PolygonTracks:
     def __init__(self) -> None:
         self._last: dict[str, tuple[int, FloatArray, FloatArray]] = {}
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self._last.clear()
+    def forget_all_but(self, names: Container[str]) -> None:
+        """Forget the polygons that are not among `names`."""
+        self._last = {name: last for name, last in self._last.items() if name in names}
 
     def update(self, name: str, points: FloatArray, floor: FloatArray, stamp_ns: int) -> Motion:
         """Take in an instance, (n, 2) points, each coordinate good to its floor, at a time [ns].

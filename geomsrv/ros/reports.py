@@ -84,8 +84,9 @@ def _diagnose_engine(report: Report) -> Diagnosis:
     values = {"scene version": str(engine.scene.version), "objects": str(len(engine.scene))}
     values |= {name: str(count) for name, count in engine.counters.items()}
     values |= {f"plan: {s.name}": f"{'on' if s.active else 'off'}: {s.reason}" for s in report.plan}
-    failed = engine.counters["evaluations failed"]
-    return Diagnosis("engine", ERROR if failed else OK, f"{failed} evaluations failed" if failed else text, values)
+    if engine.failing:
+        return Diagnosis("engine", ERROR, "the last evaluation failed; the log has the reason", values)
+    return Diagnosis("engine", OK, text, values)
 
 
 def _diagnose_inputs(report: Report) -> Diagnosis:
