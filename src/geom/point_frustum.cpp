@@ -153,13 +153,21 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
     return frame;
 }
 
+// Depths and windows in these ranges, and slopes (window over near) up to kLargestSlope, keep what is formed of
+// them in the normal range of double: squares of slopes (2^400), and lengths times slopes (2^700).
+constexpr double kSmallestDepth = 0x1p-400;
+constexpr double kLargestDepth = 0x1p500;
+constexpr double kLargestWindow = 0x1p400;
+constexpr double kLargestSlope = 0x1p200;
+
 template <int Sides>
 bool is_ordinary(const View<Sides>& view) {
     double window = 0.0;
     for (int i = 0; i < Sides; ++i) {
         window = std::max({window, std::fabs(view.low[i]), std::fabs(view.high[i])});
     }
-    return view.near >= 0x1p-400 && view.far <= 0x1p500 && window <= 0x1p400 && window <= 0x1p200 * view.near;
+    return view.near >= kSmallestDepth && view.far <= kLargestDepth && window <= kLargestWindow &&
+           window <= kLargestSlope * view.near;
 }
 
 namespace {
