@@ -46,8 +46,8 @@ class ContactStatus(IntEnum):
 
     NEVER = 0  #: no contact within ``t_max``
     WILL_TOUCH = 1  #: apart now, first contact at ``time``
-    TOUCHING = 2  #: in contact at t = 0 without a common interior point
-    OVERLAPPING = 3  #: common interior points at t = 0
+    TOUCHING = 2  #: in contact at t = 0 with depth 0: a translation however small parts them
+    OVERLAPPING = 3  #: in contact at t = 0 with depth > 0; so is a point or a segment inside a body
     UNSUPPORTED = 4  #: no kernel for this pair or motion; every number is NaN
     NOT_CONVERGED = 5  #: the work budget ran out; ``time_lower`` and ``time_upper`` bracket the answer
 

@@ -166,7 +166,7 @@ CONSTRUCTED = {
         [(0, 0), (1, 0)], [(3, 0)], (-1, 0), INF, "WILL_TOUCH", 2, 3, (1, 0), [(1, 0)],
     ),
     "point in a segment": ([(0, 0), (2, 0)], [(1, 0)], (1, 0), INF, "TOUCHING", 0, 1, None, [(1, 0)]),
-    "point in a square": (SQUARE, [(0.5, 0.5)], (0, 1), INF, "TOUCHING", 0, 0.5, None, [(0.5, 0.5)]),
+    "point in a square": (SQUARE, [(0.5, 0.5)], (0, 1), INF, "OVERLAPPING", 0, 0.5, None, [(0.5, 0.5)]),
     "collinear segments meet": (
         [(0, 0), (1, 0)], [(3, 0), (4, 0)], (-1, 0), INF, "WILL_TOUCH", 2, 4, (1, 0), [(1, 0)],
     ),
@@ -176,9 +176,9 @@ CONSTRUCTED = {
     "collinear segments overlap": (
         [(0, 0), (2, 0)], [(1, 0), (3, 0)], (0, 0), INF, "TOUCHING", 0, INF, None, [(1, 0), (2, 0)],
     ),
-    "segments cross": ([(0, 0), (2, 2)], [(0, 2), (2, 0)], (0, 0), INF, "TOUCHING", 0, INF, None, [(1, 1)]),
+    "segments cross": ([(0, 0), (2, 2)], [(0, 2), (2, 0)], (0, 0), INF, "OVERLAPPING", 0, INF, None, [(1, 1)]),
     "segment crosses a square": (
-        SQUARE, [(0.5, -1), (0.5, 2)], (1, 0), INF, "TOUCHING", 0, 0.5, None, [(0.5, 0), (0.5, 1)],
+        SQUARE, [(0.5, -1), (0.5, 2)], (1, 0), INF, "OVERLAPPING", 0, 0.5, None, [(0.5, 0), (0.5, 1)],
     ),
     "segment flush with a side": (
         SQUARE, [(0.5, 3), (2, 3)], (0, -1), INF, "WILL_TOUCH", 2, 3, (0, 1), [(0.5, 1), (1, 1)],
@@ -225,7 +225,8 @@ def is_strictly_convex(ring):
         (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
         for a, b, c in zip(points, points[1:] + points[:1], points[2:] + points[:2], strict=True)
     ]
-    return all(turn > 0 for turn in turns)
+    # What a point or a segment has in common with a body is a point or a segment.
+    return len(set(points)) == len(points) < 3 or all(turn > 0 for turn in turns)
 
 
 def test_two_contact_points_run_counterclockwise_around_a():
@@ -266,7 +267,7 @@ def test_grazing_approach_keeps_its_digits(slope):
 
 
 def random_pairs(rng, count, size):
-    """Integer pairs, most of them aimed at each other."""
+    """Integer pairs, most of them aimed at each other; some touch at a vertex or along a side, now or later."""
     pairs = []
     for _ in range(count):
         a, b = random_ring(rng, size), random_ring(rng, size)
@@ -274,6 +275,12 @@ def random_pairs(rng, count, size):
         velocity_a, velocity_b = (tuple(int(c) for c in v) for v in rng.integers(-2, 3, (2, 2)))
         if rng.random() < 0.7:
             velocity_a = tuple(int(c) for c in np.sign(offset) * rng.integers(1, 3))
+        if rng.random() < 0.15:
+            # Reflected in a vertex or in the middle of a side, it touches there.
+            i, later = int(rng.integers(len(a))), int(rng.integers(3))
+            j = (i + int(rng.integers(2))) % len(a)
+            b = [(a[i][0] + a[j][0] - x, a[i][1] + a[j][1] - y) for x, y in a]
+            offset = [later * (velocity_a[k] - velocity_b[k]) for k in range(2)]
         pairs.append((a, velocity_a, shifted(b, *(int(c) for c in offset)), velocity_b))
     return pairs
 
@@ -591,7 +598,7 @@ def test_far_from_the_origin(rng):
 def test_slender_polygons(rng):
     """Slivers, needles and nearly parallel edges: nothing is missed, and no hit is further off than the slack."""
     reached = Counter()
-    for _ in range(300):
+    for _ in range(500):
         a, b, along = slender_pair(rng)
         apart = np.mean(a, axis=0) - np.mean(b, axis=0)
         velocity = rng.choice([1.0, -1.0]) * along
@@ -624,7 +631,7 @@ def test_slender_polygons(rng):
             assert exact.separation(a, swept).signed_square <= slack, given
             reached["within the slack"] += 1
         elif status != expected:
-            assert abs(truth.separation_sq) <= slack or {status, expected} == {gs.TOUCHING, gs.OVERLAPPING}, given
+            assert abs(truth.separation_sq) <= slack, given
         else:
             assert Fraction(lower) <= truth.time <= Fraction(upper), given
             if status == gs.WILL_TOUCH and len(answer.points) == len(truth.contact):

@@ -264,7 +264,7 @@ def shifted(x: Any, y: Any) -> list[Any]:
         (shifted(1, 0), (0, 0), math.inf, "TOUCHING", 0, None, [(1, 0), (1, 1)]),
         (shifted(1, 0), (1, 0), math.inf, "TOUCHING", 0, 0, [(1, 0), (1, 1)]),
         (shifted(Fraction(1, 2), 0), (1, 0), 5, "OVERLAPPING", 0, Fraction(1, 2), None),
-        ([(-1, Fraction(1, 2)), (2, Fraction(1, 2))], (0, 1), 5, "TOUCHING", 0, Fraction(1, 2), None),
+        ([(-1, Fraction(1, 2)), (2, Fraction(1, 2))], (0, 1), 5, "OVERLAPPING", 0, Fraction(1, 2), None),
         ([(3, 3), (3, 3)], (-2, -2), math.inf, "WILL_TOUCH", 1, Fraction(3, 2), [(1, 1)]),
     ],
 )

@@ -478,27 +478,6 @@ ContactMarks contact_marks(const PolygonPair& pair, const Motion& motion, const 
     return axis.side == 0 ? ContactMarks{low, high, segment} : ContactMarks{high, low, segment};
 }
 
-/// Whether a ring has inner points further from its border than the slack.
-bool has_interior(const PolygonPair& pair, int side, const Slacks& slacks) {
-    const PairedPolygon& p = pair.side(side);
-    if (p.edges < 3) {
-        return false;
-    }
-    const auto length = [&](std::size_t k) { return std::fabs(p.dx[k]) + std::fabs(p.dy[k]); };
-    std::size_t longest = 0;
-    for (std::size_t k = 1; k < p.edges; ++k) {
-        longest = length(k) > length(longest) ? k : longest;
-    }
-    // The longest edge is at least half as long as the ring, so a flat ring has no height over it.
-    double lowest = 0.0;
-    for (std::size_t k = 0; k < p.edges; ++k) {
-        lowest = std::min(lowest, dot(p.axis(longest), p.local(k)) - p.own(longest));
-    }
-    const double size = length(longest);
-    return -lowest >
-           slacks.gap_rounding * size + std::min(2.0 * slacks.gap_noise * size, slacks.gap_limit * size);
-}
-
 /// Scaled times in seconds: a power of two, so only subnormal results are rounded.
 struct Seconds {
     int exponent;
@@ -561,8 +540,7 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         result.time = std::min(seconds.nearest(moment), t_max);
         result.time_lower = std::min(seconds.down(entry.lower), result.time);
     } else {
-        const bool solid = window.deep && has_interior(pair_, 0, slacks) && has_interior(pair_, 1, slacks);
-        result.status = solid ? ContactStatus::overlapping : ContactStatus::touching;
+        result.status = window.deep ? ContactStatus::overlapping : ContactStatus::touching;
         axis = pair_.widest_gap();
     }
     result.time_upper =

@@ -19,8 +19,8 @@ namespace geomsrv {
 enum class ContactStatus : std::uint8_t {
     never = 0,        ///< not within t_max
     will_touch = 1,   ///< apart now, in contact at `time`
-    touching = 2,     ///< in contact now, without a common interior point
-    overlapping = 3,  ///< common interior points now
+    touching = 2,     ///< in contact now, depth 0: some direction parts them at once
+    overlapping = 3,  ///< in contact now, depth > 0
 };
 
 struct FirstContact {

@@ -171,8 +171,7 @@ def first_contact(p: Any, velocity_p: Any, q: Any, velocity_q: Any, t_max: Any) 
     if first > 0:
         status = WILL_TOUCH
     else:
-        # Common interior points make a common area.  A segment across a square has depth but no interior.
-        status = OVERLAPPING if dimension(contact) == 2 else TOUCHING
+        status = OVERLAPPING if start.relation == "overlapping" else TOUCHING
     speed = None if first == 0 else _closing_speed_sq(ring, ray, first)
     return FirstContact(status, first, last, last is not None, contact, speed, start.signed_square)
 
