@@ -140,8 +140,9 @@ def test_an_exception_is_a_failure(monkeypatch):
     assert "RuntimeError: no kernel" in report.message
 
 
-def test_it_runs_from_the_command_line():
+def test_it_runs_from_the_command_line(tmp_path):
+    # Away from the sources, which would hide the installed package.
     command = [sys.executable, "-c", "from geomsrv.cli import main; raise SystemExit(main(['self-check']))"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "checks passed" in done.stdout
