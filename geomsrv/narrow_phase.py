@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ __all__ = [
     "DistanceRows",
     "distance_rows",
     "first_contact_rows",
+    "placed_distances",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -184,8 +185,13 @@ def distance_rows(
 
 def solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
     """Distances of solids, in any order; pairs without a kernel keep their rows."""
+    return DistanceRows(pairs, *(*placed_distances(world, pairs, penetration), world.uncertainty[pairs].sum(axis=1)))
+
+
+def placed_distances(world: World, pairs: IntArray, penetration: bool) -> tuple[Any, ...]:
+    """Distance, lower, upper, point_a, point_b, normal and status of solids, in any order."""
     table = world.table
-    answer = _core.distance_placed(
+    return _core.distance_placed(
         *table.packed,
         table.reach,
         world.shape,
@@ -195,7 +201,6 @@ def solid_distances(world: World, pairs: IntArray, penetration: bool) -> Distanc
         RELATIVE_POSE_ROUNDING,
         penetration,
     )
-    return DistanceRows(pairs, *answer, world.uncertainty[pairs].sum(axis=1))
 
 
 def relative_poses(world: World, pairs: IntArray) -> FloatArray:

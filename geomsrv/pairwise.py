@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -15,15 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geomsrv import _validate
+from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.errors import GeometryError
 from geomsrv.narrow_phase import (
     NO_DISTANCE,
+    RELATIVE_POSE_ROUNDING,
     DistanceRows,
     Unsupported,
     count_kinds,
     first_contact_rows,
+    placed_distances,
     polygon_contacts,
     polygon_distances,
     solid_distances,
@@ -36,6 +37,7 @@ __all__ = [
     "Bodies",
     "ListedContacts",
     "ListedDistances",
+    "distance_of_two",
     "listed_distances",
     "listed_first_contacts",
     "world_of",
@@ -135,8 +137,9 @@ def world_of(*sides: Bodies) -> World:
                 if row < len(side.shapes):
                     raise GeometryError(f"poses{side.suffix}[{row}]: {text}")
                 row -= len(side.shapes)
-    world = copy(model)
-    world.__dict__.update(poses=poses, twists=twists)
+    # A copy of the model but for these; dataclasses.replace would take as long as a query.
+    world = object.__new__(World)
+    world.__dict__.update(model.__dict__, poses=poses, twists=twists)
     return world
 
 
@@ -163,6 +166,38 @@ def _resting(shapes: tuple[Shape | Frustum, ...]) -> World:
     return world
 
 
+def distance_of_two(
+    a: Shape | Frustum, b: Shape | Frustum, poses: FloatArray, *, penetration: bool, accuracy: str
+) -> ListedDistances | None:
+    """Distance of two solids with checked poses (2, 7) that are in no scene; None if they have to go the long way.
+
+    The same as `listed_distances` of `world_of`, without what only longer lists need: the one pair of a small request
+    is answered in the time that the rest of the call takes anyway.
+    """
+    start = time.perf_counter_ns()
+    model = _resting((a, b))
+    if model.planar.any():
+        return None
+    distance, lower, upper, point_a, point_b, normal, status = _core.distance_placed(
+        *model.table.packed,
+        model.table.reach,
+        model.shape,
+        poses,
+        model.uncertainty,
+        _ONE_PAIR,
+        RELATIVE_POSE_ROUNDING,
+        penetration,
+    )
+    if status[0] == DistanceStatus.UNSUPPORTED:
+        return None
+    names = (a.kind, b.kind) if a.kind < b.kind else (b.kind, a.kind)
+    cost = Cost(time.perf_counter_ns() - start, accuracy, {"narrow {}-{}".format(*names): 1})
+    return ListedDistances(status, distance, lower, upper, point_a, point_b, normal, "", cost)
+
+
+_ONE_PAIR = np.array([[0, 1]])
+
+
 def _checked(
     sides: Sequence[Bodies], name: str, rows: Sequence[FloatArray], check: Callable[[FloatArray, str], FloatArray]
 ) -> FloatArray:
@@ -183,27 +218,33 @@ def listed_distances(
     tier = _validate.accuracy(accuracy)
     penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
     _distinct(world, pairs)
+    _count(world, pairs, counts)
     # Most lists are all of one kind, and then no row needs to be moved.
     planar = world.planar[pairs] if world.planar.any() else _NONE
     if not planar.any():
-        rows = solid_distances(world, pairs, penetration)
+        columns = placed_distances(world, pairs, penetration)
     elif planar.all():
-        rows = polygon_distances(world, pairs, penetration)
+        columns = _columns(polygon_distances(world, pairs, penetration))
     else:
-        rows = _mixed_distances(world, pairs, planar, penetration)
-    unsupported = rows.status == DistanceStatus.UNSUPPORTED
-    _count(world, pairs, counts)
+        columns = _columns(_mixed_distances(world, pairs, planar, penetration))
+    distance, lower, upper, point_a, point_b, normal, status = columns
+    unsupported = status == DistanceStatus.UNSUPPORTED
     return ListedDistances(
-        status=rows.status,
-        distance=rows.distance,
-        lower=rows.lower,
-        upper=rows.upper,
-        point_a=rows.point_a,
-        point_b=rows.point_b,
-        normal=rows.normal,
+        status=status,
+        distance=distance,
+        lower=lower,
+        upper=upper,
+        point_a=point_a,
+        point_b=point_b,
+        normal=normal,
         message=_reasons(world, pairs[unsupported]) if unsupported.any() else "",
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
     )
+
+
+def _columns(rows: DistanceRows) -> tuple[Any, ...]:
+    """The order of `placed_distances`."""
+    return rows.distance, rows.lower, rows.upper, rows.point_a, rows.point_b, rows.normal, rows.status
 
 
 def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetration: bool) -> DistanceRows:
@@ -221,17 +262,23 @@ def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetrati
     return whole
 
 
+FEW = 8  # pairs are looked at faster one by one
+
+
 def _count(world: World, pairs: IntArray, counts: Counter[str]) -> None:
-    """What `count_kinds` counts; a few pairs are counted faster one by one."""
-    if len(pairs) > 8:
+    """What `count_kinds` counts."""
+    if len(pairs) > FEW:
         count_kinds(world, pairs, counts)
         return
+    shapes, shape = world.table.shapes, world.shape
     for i, j in pairs.tolist():
-        a, b = sorted(world.table.shapes[world.shape[k]].kind for k in (i, j))
-        counts[f"narrow {a}-{b}"] += 1
+        a, b = shapes[shape[i]].kind, shapes[shape[j]].kind
+        counts[f"narrow {a}-{b}" if a < b else f"narrow {b}-{a}"] += 1
 
 
 def _distinct(world: World, pairs: IntArray) -> None:
+    if len(pairs) <= FEW and all(i != j for i, j in pairs.tolist()):
+        return
     same = pairs[:, 0] == pairs[:, 1]
     if same.any():
         k = int(np.argmax(same))

@@ -23,6 +23,7 @@ from distance_scenes import (
     box_pair,
     check_answer,
     exact_pair,
+    hull,
     hull_pair,
     random_turn,
     rotation,
@@ -224,6 +225,19 @@ def scaled(body: gs.Shape, scale: float) -> gs.Shape:
         object.__setattr__(larger, "offset", body.offset * scale)
         return larger
     return gs.Convex(body.vertices * scale)
+
+
+@pytest.mark.parametrize("kind", ["slab", "needle"])
+def test_nearest_points_of_slivers(kind: str, rng: np.random.Generator) -> None:
+    """p_b = p_a + d n to rounding, also where the faces are 1e-6 wide and weights are hard to come by."""
+    a, b = ([hull(rng, kind) + [x, 0, 0] for _ in range(2000)] for x in (0.0, 1.5))
+    bodies = gs.Polytopes.from_list(a), gs.Polytopes.from_list(b)
+    answer = gs.distance(*bodies, want=DEEP)
+    gap = answer.point_b - answer.point_a - answer.distance[:, None] * answer.normal
+    worst = int(np.abs(gap).max(axis=1).argmax())
+    assert np.abs(gap).max() <= ROUNDING * 8.0, (gap[worst], reproducer(a=a[worst], b=b[worst]))
+    assert answer.cost.counts == {"ok": 2000}
+    assert (answer.distance > 0.0).sum() >= 500
 
 
 def test_depth_never_exceeds_what_any_direction_needs(rng: np.random.Generator) -> None:

@@ -139,6 +139,17 @@ def test_distance_inline(desk) -> None:
     assert got.distance.tolist() == [1.0, 3.0, -0.5]
 
 
+def test_distance_of_two_bodies(desk) -> None:
+    fields = {"select": INLINE, "shapes_a": shapes(gs.Sphere(1.0)), "poses_a": at((0, 0, 0)), "poses_b": at((3, 0, 0))}
+    got = desk.ask("Distance", **fields, shapes_b=shapes(gs.Box([1, 1, 1])), want=["witness"])
+    assert got.status == OK and got.distance.tolist() == [1.0] and got.normal.tolist() == [1, 0, 0]
+    assert got.cost.stages == ["narrow box-sphere"] and got.scene_version == 0 and got.ids_a == []
+    cone = desk.ask("Distance", **fields, shapes_b=shapes(gs.Cone(1, 1)))
+    assert cone.status == UNSUPPORTED and "cone-sphere" in cone.message
+    flat = desk.ask("Distance", **fields, shapes_b=shapes(SQUARE))
+    assert flat.status == UNSUPPORTED and "polygons" in flat.message
+
+
 def test_distance_of_all_pairs_nearest_first(desk) -> None:
     got = desk.ask("Distance", select=ALL, max_distance=8.0, want=["witness"])
     found = list(zip(got.ids_a, got.ids_b, got.distance, strict=True))

@@ -9,7 +9,7 @@ import pytest
 from conftest import reproducer
 
 import geomsrv as gs
-from geomsrv.pairwise import Bodies, listed_distances, listed_first_contacts, world_of
+from geomsrv.pairwise import Bodies, distance_of_two, listed_distances, listed_first_contacts, world_of
 
 
 def random_scene(rng, uncertain=False) -> gs.Scene:
@@ -148,3 +148,32 @@ def test_a_pair_with_itself_is_named(rng) -> None:
     for ask in (listed_distances, lambda w, p: listed_first_contacts(w, p, 1.0)):
         with pytest.raises(gs.GeometryError, match="pair 1 is 'f3' with itself"):
             ask(world, np.array([[0, 1], [3, 3]]))
+
+
+def test_two_bodies_get_the_same_answer_the_short_way(rng) -> None:
+    makers = [gs.Sphere(0.5), gs.Box([0.2, 0.4, 0.6]), gs.Capsule(0.2, 1.0), gs.Convex(rng.normal(size=(6, 3)))]
+    shapes = [*makers, gs.HalfSpace([0.0, 0.6, 0.8], -1.0), gs.Cone(0.3, 1.0), gs.Polygon([[0, 0], [1, 0], [0, 1]])]
+    answered = refused = 0
+    for a in shapes:
+        for b in shapes:
+            turns = rng.normal(size=(2, 4))
+            turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            if gs.Polygon in (type(a), type(b)):
+                turns = np.tile([0.0, 0, 0, 1], (2, 1))
+            poses = np.column_stack([rng.normal(size=(2, 3)) * (1, 1, gs.Polygon not in (type(a), type(b))), turns])
+            poses = gs._validate.poses(poses)
+            rest = np.zeros((0, 6))
+            world = world_of(Bodies([a], poses[:1], rest), Bodies([b], poses[1:], rest))
+            for want in ((), ("penetration",)):
+                long = listed_distances(world, np.array([[0, 1]]), want=want)
+                short = distance_of_two(a, b, world.poses, penetration=bool(want), accuracy="float64")
+                if short is None:
+                    refused += 1
+                    assert long.status[0] == 2 or isinstance(a, gs.Polygon)
+                    continue
+                answered += 1
+                for name in ("status", "distance", "lower", "upper", "point_a", "point_b", "normal"):
+                    one, other = getattr(short, name), getattr(long, name)
+                    assert np.array_equal(one, other, equal_nan=True), (a.kind, b.kind, name)
+                assert short.cost.counts == long.cost.counts and short.message == long.message == ""
+    assert answered > 40 and refused > 20

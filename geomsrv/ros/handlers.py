@@ -21,7 +21,7 @@ from geomsrv import _validate, queries
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
-from geomsrv.pairwise import Bodies, ListedContacts, listed_distances, listed_first_contacts, world_of
+from geomsrv.pairwise import Bodies, ListedContacts, distance_of_two, listed_distances, listed_first_contacts, world_of
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
@@ -212,6 +212,10 @@ class Handlers:
             _unused(request, *_BY_IDS, *_INLINE)
             self._all_distances(request, response, want, accuracy)
             return
+        if request.select == INLINE and len(request.shapes_a) == 1 == len(request.shapes_b):
+            _unused(request, *_BY_IDS)
+            if self._distance_of_two(request, response, want, accuracy):
+                return
         if request.select == BY_IDS and request.ids_a and not request.ids_b:
             _unused(request, *_INLINE)
             world, pairs, lonely = self._nearest(request.ids_a, accuracy)
@@ -223,6 +227,22 @@ class Handlers:
             _set_ids(response, world, pairs)
         _set_distances(response, answer, want)
         _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message, lonely)
+
+    def _distance_of_two(self, request: Any, response: Any, want: tuple[str, ...], accuracy: str) -> bool:
+        """Two bodies, if there is nothing more to say about them than their distance."""
+        flat = request.poses_a + request.poses_b
+        if len(flat) != 14 or len(request.poses_a) != 7 or self.engine.config.cross_check_mode != "off":
+            return False
+        try:
+            a, b = convert.shape_from(request.shapes_a[0]), convert.shape_from(request.shapes_b[0])
+            poses = _validate.poses(convert.floats(flat).reshape(2, 7))
+        except GeometryError:
+            return False  # for the long way to name the field
+        answer = distance_of_two(a, b, poses, penetration="penetration" in want, accuracy=accuracy)
+        if answer is None:
+            return False
+        _set_distances(response, answer, want)
+        return True
 
     def _nearest(self, ids: Sequence[str], accuracy: str) -> tuple[World, IntArray, str]:
         """Every id with the object nearest to it, and words about those that have none."""
