@@ -52,7 +52,7 @@ OPTIONAL = {
 # The C++ includes: its own directories by their path from src, the standard library by names without a dot.
 CPP_LAYERS = {
     "src/bind/*": ("bind/*", "geom/*", "nanobind/*"),
-    "src/geom/*": ("geom/*",),
+    "src/geom/*": ("geom/*", "boost/multiprecision/cpp_int.hpp"),
 }
 VECTOR_INTRINSICS = ("immintrin.h",)
 INPUT_OUTPUT = ("cstdio", "fstream", "filesystem", "iostream", "istream", "ostream", "print", "syncstream")
