@@ -45,7 +45,7 @@ PYTHON_LAYERS = {
 
 # Optional peers, imported on use.  "*" marks a file that may choose the module's name at run time.
 OPTIONAL = {
-    "geomsrv/fcl_worker.py": ("fcl",),
+    "geomsrv/fcl_worker.py": ("coal", "fcl"),
     "geomsrv/robot.py": ("*",),
 }
 
