@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from geomsrv.answers import ContactStatus, CullState, DistanceStatus
-from geomsrv.errors import NotAvailableError
+from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.hard_cases import DECIDABLE, Case, Motion, Truth, signed_square
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
 from geomsrv.shapes import Frustum
@@ -63,7 +63,7 @@ class Finding:
 
 
 def judge(case: Case, accuracy: str, truth: Truth | None = None) -> Finding | None:
-    """Answer a case at a tier, and compare with the truth; None if the tier or a kernel is not available.
+    """Answer a case at a tier, and compare with the truth; None if the tier, a shape or a kernel is not available.
 
     Parameters
     ----------
@@ -74,6 +74,10 @@ def judge(case: Case, accuracy: str, truth: Truth | None = None) -> Finding | No
     """
     known = truth or case.truth
     assert known is not None, f"nobody knows what {case.name} should be"
+    try:
+        _ = case.bodies
+    except GeometryError:
+        return None
     found = [finding for query in _QUERIES[case.kind] if (finding := _asked(query, case, accuracy, known))]
     return _worst(found) if found else None
 

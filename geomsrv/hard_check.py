@@ -141,7 +141,7 @@ def check(
         row = f"{case.kind} {case.group}" if by_group else case.kind
         known.append((row, case, truth))
         for tier in TIERS:
-            if tier in engines and (finding := _judged(case, tier, truth)) is not None:
+            if tier in engines and (finding := judge(case, tier, truth)) is not None:
                 report.add(row, tier, case, finding)
     for peer in PEERS:
         if peer in engines:
@@ -149,16 +149,9 @@ def check(
     return report
 
 
-def _judged(case: Case, tier: str, truth: Truth) -> Finding | None:
-    try:
-        return judge(case, tier, truth)
-    except GeometryError:
-        return None  # a shape that cannot be made
-
-
 def unsupported(path: Path) -> dict[tuple[str, str], list[str]]:
     """Names of a file's cases that the engine has no query or no kernel for, by kind and shapes."""
-    answered = {case.name for case in read(path) if case.truth and _judged(case, "float64", case.truth)}
+    answered = {case.name for case in read(path) if case.truth and judge(case, "float64", case.truth)}
     found: dict[tuple[str, str], list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         record = json.loads(line)
