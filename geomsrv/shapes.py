@@ -280,8 +280,9 @@ class Frustum:
         near = np.array([[x, y, self.near] for y in (u0, u1) for x in (l0, l1)])
         both = np.concatenate([near, near * (self.far / self.near)])
         # Written out: what a matrix product rounds depends on the processor.
-        local = both[:, :1] * self.axes[0] + both[:, 1:2] * self.axes[1] + both[:, 2:] * self.axes[2]
-        return (self.origin - np.asarray(origin, dtype=np.float64))[..., None, :] + local
+        local: FloatArray = both[:, :1] * self.axes[0] + both[:, 1:2] * self.axes[1] + both[:, 2:] * self.axes[2]
+        placed: FloatArray = (self.origin - np.asarray(origin, dtype=np.float64))[..., None, :] + local
+        return placed
 
     def corner_error(self, origin: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
         """How far rounding may have moved `corners` from the exact ones: scalar for one origin, (n,) for (n, 3)."""

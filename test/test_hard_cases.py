@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -17,8 +19,9 @@ from conftest import hard_cases as corpus
 from hard import suite
 from hard.truth import TRUTHS, truth_of
 
-from geomsrv import _verdict, hard_check
+from geomsrv import _fcl_supervisor, _validate, _verdict, hard_check
 from geomsrv._verdict import Verdict, judge, judge_peer
+from geomsrv.cli import main
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.hard_cases import Case, Truth, read, signed_square
 from geomsrv.hard_check import TIERS
@@ -246,3 +249,81 @@ def test_nothing_is_asked_of_a_tier_that_is_not_there(monkeypatch: pytest.Monkey
     assert judge(boxes(0.25), "float64") is None
     report = hard_check.check([boxes(0.25)], engines=("float64",))
     assert report.tallies == {} and report.engine_wrong == 0
+
+
+# ------------------------------------------------------------------------------------------------- the command line
+
+
+@pytest.fixture
+def few(tmp_path: Path) -> Path:
+    """A file of some cases of every kind."""
+    lines = (DATA / "hard_cases.jsonl").read_text().splitlines()[::16] + [suite.line(boxes(0.25)), ""]
+    file = tmp_path / "few.jsonl"
+    file.write_text("\n".join(lines))
+    return file
+
+
+def table_of(text: str) -> dict[tuple[str, str], list[int]]:
+    """Counts by kind and engine of the printed table."""
+    found, kind = {}, ""
+    for line in text.splitlines()[1:]:
+        words = line.split()
+        if len(words) < 5 or not all(word.isdigit() for word in words[-4:]):
+            break
+        engine = words[-5]
+        rest = [word for word in words[:-5] if word != "geomsrv"]
+        kind = rest[0] if rest else kind
+        found[kind, engine] = [int(word) for word in words[-4:]]
+    return found
+
+
+def test_command(few: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["crosscheck", "--hard", "--cases", str(few)]) == 0
+    out = capsys.readouterr().out
+    found = table_of(out)
+    assert {kind for kind, engine in found if engine == "float64"} >= set(KINDS)
+    for (_, engine), (right, uncertain, wrong, crashed) in found.items():
+        assert right + uncertain + wrong + crashed > 0
+        assert engine not in TIERS or wrong == crashed == 0
+    if importlib.util.find_spec("fcl"):
+        assert sum(found["box_box_distance", "fcl"]) >= 2
+    for peer in hard_check.PEERS:
+        if importlib.util.find_spec(peer) is None:
+            assert f"{peer}: not asked" in out
+
+
+def test_command_says_when_the_engine_is_wrong(
+    few: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lying(monkeypatch, "cull", state=lambda x: 2 - x, certain=lambda x: x | True)
+    assert main(["crosscheck", "--hard", "--cases", str(few)]) == 1
+    assert "WRONG float64: frustum_box" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["{", '{"kind": "collide", "shapes": []}\n', None])
+def test_command_names_what_it_cannot_read(
+    text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.jsonl"
+    if text is not None:
+        file.write_text(text)
+    assert main(["crosscheck", "--hard", "--cases", str(file)]) == 2
+    assert "bad.jsonl" in capsys.readouterr().err
+
+
+def test_crashes_of_peers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("fcl")
+    script = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
+    monkeypatch.setattr(_fcl_supervisor, "RESTART_PAUSE_S", (0.001, 0.004))
+    monkeypatch.setattr(_fcl_supervisor, "WORKER_COMMAND", (sys.executable, "-S", "-c", script))
+    report = hard_check.check([boxes(0.25)], engines=("fcl",))
+    assert report.tallies["box_box_distance", "fcl"].crashed == 1
+
+
+def test_without_an_answer_the_exact_tier_is_the_judge() -> None:
+    case = replace(boxes(0.25), truth=None)
+    report = hard_check.check([case], engines=("float64", "fcl"))
+    if "exact" in _validate.AVAILABLE_ACCURACIES:
+        assert report.tallies["box_box_distance", "float64"].right == 1 and not report.undecided
+    else:
+        assert report.undecided == 1
