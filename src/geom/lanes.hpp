@@ -43,23 +43,28 @@ struct MaskOf {
     GEOMSRV_INLINE friend MaskOf operator|(const MaskOf& a, const MaskOf& b) { return MaskOf(a.v | b.v); }
     GEOMSRV_INLINE friend MaskOf operator~(const MaskOf& a) { return MaskOf(~a.v); }
     GEOMSRV_INLINE friend bool all(const MaskOf& a) {
-        return a.fold([](Whole x, Whole y) __attribute__((always_inline)) { return x & y; }) != 0;
+        const auto w = reinterpret_cast<Words>(a.v);
+        if constexpr (kWide) {
+            return ((w[0] & w[1]) & (w[2] & w[3])) == -1;
+        } else {
+            return (w[0] & w[1]) == -1;
+        }
     }
     GEOMSRV_INLINE friend bool any(const MaskOf& a) {
-        return a.fold([](Whole x, Whole y) __attribute__((always_inline)) { return x | y; }) != 0;
+        const auto w = reinterpret_cast<Words>(a.v);
+        if constexpr (kWide) {
+            return ((w[0] | w[1]) | (w[2] | w[3])) != 0;
+        } else {
+            return (w[0] | w[1]) != 0;
+        }
     }
 
 private:
-    template <class Join>
-    GEOMSRV_INLINE Whole fold(Join join) const {
-        static_assert(Count == 4 || Count == 8);
-        const Whole first = join(join(v[0], v[1]), join(v[2], v[3]));
-        if constexpr (Count == 4) {
-            return first;
-        } else {
-            return join(first, join(join(v[4], v[5]), join(v[6], v[7])));
-        }
-    }
+    // Lanes have one outcome each, so words of any size tell the same.
+    static constexpr bool kWide = Count * sizeof(Whole) == 32;
+    using FourWords [[gnu::vector_size(32)]] = std::int64_t;
+    using TwoWords [[gnu::vector_size(16)]] = std::int64_t;
+    using Words = std::conditional_t<kWide, FourWords, TwoWords>;
 };
 
 /// Numbers side by side; operations are lane by lane and compile to whatever vectors the target has.
@@ -152,6 +157,16 @@ GEOMSRV_INLINE void store_bytes(const Lanes& x, std::uint8_t* to) {
     const auto packed = static_cast<std::uint32_t>(
         static_cast<std::int64_t>((digits[0] + digits[1]) + (digits[2] + digits[3])));
     std::memcpy(to, &packed, sizeof packed);
+}
+
+GEOMSRV_INLINE void store_bytes(const FloatLanes& x, std::uint8_t* to) {
+    for (int i = 0; i < FloatLanes::kCount; ++i) to[i] = static_cast<std::uint8_t>(x[i]);
+}
+
+/// Rounded to single precision.
+GEOMSRV_INLINE FloatLanes joined(const Lanes& low, const Lanes& high) {
+    return FloatLanes(__builtin_convertvector(__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7),
+                                              FloatLanes::Vector));
 }
 
 GEOMSRV_INLINE double magnitude(double x) { return std::fabs(x); }
