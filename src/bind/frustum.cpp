@@ -67,6 +67,9 @@ GEOMSRV_INLINE std::array<L, 3> local_rows(const CullPlanes<L>& planes, const do
     const auto four = [&](const double* p) __attribute__((always_inline)) {
         FourRows<3> found(p);
         for (int k = 0; k < 3; ++k) found.at[k] = found.at[k] - shift[k];
+        if (planes.scaled) {
+            for (Lanes& x : found.at) x = x * planes.unit.first * planes.unit.second;
+        }
         return found;
     };
     const FourRows<3> first = four(rows);
@@ -74,11 +77,8 @@ GEOMSRV_INLINE std::array<L, 3> local_rows(const CullPlanes<L>& planes, const do
         return {first.at[0], first.at[1], first.at[2]};
     } else {
         const FourRows<3> second = four(rows + 12);
-        const auto join = [&](int k) __attribute__((always_inline)) {
-            return joined(first.at[k] * planes.unit.first * planes.unit.second,
-                          second.at[k] * planes.unit.first * planes.unit.second);
-        };
-        return {join(0), join(1), join(2)};
+        return {joined(first.at[0], second.at[0]), joined(first.at[1], second.at[1]),
+                joined(first.at[2], second.at[2])};
     }
 }
 
