@@ -28,6 +28,14 @@ __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersec
 FloatArray = NDArray[np.float64]
 Batch = Boxes | Polygons | Polytopes | Frustum
 
+CULL_STAGES = ("bound", "filter", "wide", "exact", "uncertain")  # in the order in which the engine counts
+CULL_COUNTS = {
+    "bound": ("bound", "uncertain"),
+    "float32": ("bound", "filter", "uncertain"),
+    "float64": ("bound", "filter", "uncertain"),
+    "exact": ("bound", "filter", "wide", "exact"),
+}
+
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
     """Which boxes a camera frustum sees.
@@ -70,10 +78,10 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
     _validate.certificates(certificates)
-    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents)
-    stages = dict(zip(("bound", "filter", "uncertain"), counts, strict=True))
+    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     return Cull(state, certain, Cost(time.perf_counter_ns() - start, tier, stages))
 
 
