@@ -50,6 +50,7 @@ from geomsrv.shapes import (
     Sphere,
     Triangle,
 )
+from geomsrv.verify import verify
 
 __all__ = [
     "Booleans",
@@ -104,6 +105,7 @@ __all__ = [
     "distance_to_frustum",
     "first_contact",
     "intersects",
+    "verify",
 ]
 
 OUTSIDE, INTERSECTS, INSIDE = CullState.OUTSIDE, CullState.INTERSECTS, CullState.INSIDE

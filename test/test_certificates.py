@@ -1,0 +1,207 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""Certificates: what the checker accepts is true, what is true can be proven, and a change is noticed."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections import Counter
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from certificate_records import contact_record, cull_record, distance_record, falsified, is_true
+from conftest import reproducer
+from oracle.vectors import cross, dot
+from polygon_scenes import random_ring
+
+from geomsrv.verify import CertificateError, verify_record
+
+CHECKER = Path(__file__).resolve().parents[1] / "geomsrv" / "verify.py"
+
+
+def proves(record) -> bool:
+    try:
+        verify_record(record)
+    except CertificateError:
+        return False
+    return True
+
+
+def test_checker_imports_the_standard_library_only() -> None:
+    tree = ast.parse(CHECKER.read_text())
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            names.add(node.module)
+    assert names == {"__future__", "collections.abc", "fractions", "itertools", "json", "math", "typing"}
+    assert "import" not in {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+# ------------------------------------------------------------------------------------------------------ scenes
+
+
+def lattice(rng, *shape, size=3):
+    return rng.integers(-size, size + 1, shape).astype(float).tolist()
+
+
+SIGNED = [np.eye(3)[list(order)] * np.array(signs)[:, None] for order, signs in [
+    ((0, 1, 2), (1, 1, 1)), ((1, 2, 0), (1, -1, 1)), ((2, 1, 0), (-1, 1, -1)), ((0, 2, 1), (1, 1, -1)),
+]]  # fmt: skip
+
+
+def frame(rng):
+    """Rows: exact, or rounded."""
+    if rng.random() < 0.6:
+        return SIGNED[rng.integers(len(SIGNED))].tolist()
+    return np.linalg.qr(rng.normal(size=(3, 3)))[0].tolist()
+
+
+def box(rng):
+    half = rng.integers(0, 4, 3) / 2.0
+    center = lattice(rng, 3, size=5) if rng.random() < 0.7 else rng.normal(size=3).tolist()
+    return {"kind": "box", "center": center, "axes": frame(rng), "half_extents": half.tolist()}
+
+
+def frustum(rng, planar=False):
+    near = float(rng.integers(1, 3))
+    bounds = []
+    for _ in range(2 - planar):
+        low = rng.integers(-4, 3) / 2.0
+        bounds += [low, low + rng.integers(1, 5) / 2.0]
+    axes = [[0.0, -1.0], [1.0, 0.0]] if planar else frame(rng)
+    origin = lattice(rng, 3 - planar)
+    far = near + float(rng.choice([0.5, 1.0, 3.0, 1e6]))
+    return {"kind": "frustum", "origin": origin, "axes": axes, "bounds": bounds, "near": near, "far": far}
+
+
+def hull(rng):
+    points = lattice(rng, int(rng.integers(1, 9)), 3) if rng.random() < 0.7 else rng.normal(size=(6, 3)).tolist()
+    return {"kind": "hull", "vertices": points}
+
+
+def sphere(rng):
+    return {"kind": "sphere", "radius": float(rng.integers(0, 5)) / 2.0}
+
+
+def capsule(rng):
+    return {"kind": "capsule", "half_length": float(rng.integers(0, 4)), "radius": float(rng.integers(0, 5)) / 2.0}
+
+
+def posed(rng, body):
+    """Somewhere else, on a lattice or not."""
+    return body | {"rotation": frame(rng), "translation": lattice(rng, 3, size=6)}
+
+
+def solid(rng):
+    body = [box, frustum, hull, sphere, capsule][rng.integers(5)](rng)
+    return posed(rng, body) if rng.random() < 0.5 else body
+
+
+def polygon(rng):
+    ring = random_ring(rng, 3)
+    shift = lattice(rng, 2, size=6)
+    points = [[x + shift[0], y + shift[1]] for x, y in ring]
+    if rng.random() < 0.3:
+        points = (np.array(points) @ np.linalg.qr(rng.normal(size=(2, 2)))[0]).tolist()
+    return {"kind": "polygon", "vertices": points, "velocity": lattice(rng, 2, size=2)}
+
+
+def distance_scene(rng):
+    return distance_record(solid(rng), solid(rng))
+
+
+def flat_distance_scene(rng):
+    a = polygon(rng) if rng.random() < 0.7 else frustum(rng, planar=True)
+    return distance_record(a, polygon(rng))
+
+
+def cull_scene(rng):
+    camera = frustum(rng)
+    body = box(rng)
+    if rng.random() < 0.6:  # in view, more often than by chance
+        (l0, l1, u0, u1), near = camera["bounds"], camera["near"]
+        t = 1.0 + rng.integers(0, 5) / 4.0 * min(camera["far"] / near - 1.0, 2.0)
+        ray = np.array([(l0 + l1) / 2.0, (u0 + u1) / 2.0, near]) @ np.array(camera["axes"])
+        body["center"] = (np.array(camera["origin"]) + t * ray).tolist()
+        body["half_extents"] = [x / 4.0 for x in body["half_extents"]]
+    return cull_record(camera, body)
+
+
+def contact_scene(rng):
+    a, b = polygon(rng), polygon(rng)
+    if rng.random() < 0.3:  # vertex on vertex
+        b["vertices"] = (np.array(b["vertices"]) - b["vertices"][0] + a["vertices"][0]).tolist()
+    if rng.random() < 0.3:  # head on
+        b["velocity"] = (np.array(a["vertices"][0]) - b["vertices"][0] + a["velocity"]).tolist()
+    return contact_record(a, b, float(rng.choice([0.0, 1.0, 4.0, math.inf])))
+
+
+SCENES = {
+    "distance": distance_scene,
+    "distance, plane": flat_distance_scene,
+    "cull": cull_scene,
+    "first contact": contact_scene,
+}
+KINDS = {"distance": 4, "distance, plane": 3, "cull": 3, "first contact": 4}  #: how many `kind_of` can tell apart
+
+
+def kind_of(record):
+    """What is to be proven."""
+    claim = record["claim"]
+    return str(claim.get("state") or claim.get("status") or (claim["meets"], claim["lower"] == claim["upper"]))
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_oracle_evidence_proves_the_answer(scene, rng) -> None:
+    reached: Counter[str] = Counter()
+    for _ in range(150):
+        record = SCENES[scene](rng)
+        try:
+            verify_record(record)
+        except CertificateError as fault:
+            raise AssertionError(f"{fault}\n{reproducer(**record)}") from fault
+        assert is_true(record)
+        reached[kind_of(record)] += 1
+    assert len(reached) == KINDS[scene] and min(reached.values()) >= 3, reached
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_change_is_rejected_or_still_true(scene, rng) -> None:
+    rejected = accepted = 0
+    for _ in range(12):
+        record = SCENES[scene](rng)
+        for change, other in falsified(record, "claim", "evidence"):
+            if not proves(other):
+                rejected += 1
+                continue
+            accepted += 1
+            assert is_true(other), f"{change}\n{reproducer(**record)}"
+    assert rejected > accepted > 0
+
+
+def is_valid(body) -> bool:
+    """Whether the oracle can tell the planes of a body, if it is a frustum."""
+    if body["kind"] != "frustum" or len(body["axes"]) < 3:
+        return True
+    l0, l1, u0, u1 = body["bounds"]
+    near, far = body["near"], body["far"]
+    a, b, c = (tuple(map(Fraction, axis)) for axis in body["axes"])
+    return dot(a, cross(b, c)) != 0 and l0 < l1 and u0 < u1 and 0 < near < far < math.inf
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_what_is_proven_of_other_bodies_is_true_of_them(scene, rng) -> None:
+    accepted = 0
+    for _ in range(4):
+        record = SCENES[scene](rng)
+        for change, other in falsified(record, "a", "b"):
+            if proves(other) and is_valid(other["a"]):
+                accepted += 1
+                assert is_true(other), f"{change}\n{reproducer(**record)}"
+    assert accepted > 0
