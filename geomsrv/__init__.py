@@ -9,6 +9,7 @@ Importable without ROS.  Everything public is re-exported here; see `geomsrv.que
 from geomsrv._version import __version__
 from geomsrv.answers import (
     Booleans,
+    Certificates,
     ContactStatus,
     Cost,
     Cull,
@@ -50,7 +51,7 @@ from geomsrv.shapes import (
     Sphere,
     Triangle,
 )
-from geomsrv.verify import verify
+from geomsrv.verify import verify, verify_record
 
 __all__ = [
     "Booleans",
@@ -58,6 +59,7 @@ __all__ = [
     "Boxes",
     "Capsule",
     "CertificateError",
+    "Certificates",
     "Cone",
     "ContactStatus",
     "Convex",
@@ -106,6 +108,7 @@ __all__ = [
     "first_contact",
     "intersects",
     "verify",
+    "verify_record",
 ]
 
 OUTSIDE, INTERSECTS, INSIDE = CullState.OUTSIDE, CullState.INTERSECTS, CullState.INSIDE

@@ -7,16 +7,20 @@ Only values live here.  Row i of every array belongs to item i of the batch; NaN
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
+from os import PathLike
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "Booleans",
+    "Certificates",
     "ContactStatus",
     "Cost",
     "Cull",
@@ -31,6 +35,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 BoolArray = NDArray[np.bool_]
+Record = dict[str, Any]
 
 
 class CullState(IntEnum):
@@ -97,8 +102,77 @@ class Cost:
     counts: dict[str, int] = field(default_factory=dict)
 
 
+class Evidence(NamedTuple):
+    """What was kept of a query to prove its answer."""
+
+    items: int
+    record: Callable[[Any, int], Record]  #: of the answer and an item of it
+
+
 @dataclass(frozen=True, eq=False)
-class Cull:
+class Certificates:
+    """Records that prove an answer, one for each item, written when they are read; see the page on certificates.
+
+    Examples
+    --------
+    >>> import geomsrv as gs
+    >>> square = gs.Polygons.from_list([[(0, 0), (1, 0), (1, 1), (0, 1)]])
+    >>> other = gs.Polygons.from_list([[(3, 0), (4, 0), (4, 1), (3, 1)]])
+    >>> answer = gs.first_contact(square, other, (1, 0), (0, 0), certificates=True)
+    >>> answer.certificates[0]["claim"]["status"]
+    'WILL_TOUCH'
+    >>> gs.verify(answer)
+    """
+
+    _answer: Any = field(repr=False)
+    _evidence: Evidence = field(repr=False)
+
+    def __len__(self) -> int:
+        return self._evidence.items
+
+    def __getitem__(self, i: int) -> Record:
+        return self._evidence.record(self._answer, range(len(self))[i])
+
+    def __iter__(self) -> Iterator[Record]:
+        return (self[i] for i in range(len(self)))
+
+    def lines(self) -> Iterator[str]:
+        """Records as JSON, without line ends; floats as `float.hex` text, which loses nothing."""
+        return map(json_line, self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write all lines to a file, for the command ``geomsrv verify``."""
+        with open(path, "w", encoding="ascii") as file:
+            file.writelines(f"{line}\n" for line in self.lines())
+
+
+def json_line(record: Record) -> str:
+    """A record as JSON without a line's end."""
+    return json.dumps(_in_hex(record))
+
+
+def _in_hex(value: Any) -> Any:
+    if isinstance(value, float):
+        return value.hex()
+    if isinstance(value, dict):
+        return {name: _in_hex(item) for name, item in value.items()}
+    return [_in_hex(item) for item in value] if isinstance(value, list) else value
+
+
+@dataclass(frozen=True, eq=False)
+class _Certified:
+    """An answer that can be asked for with ``certificates=True``."""
+
+    _evidence: Evidence | None = field(default=None, repr=False, kw_only=True)
+
+    @property
+    def certificates(self) -> Certificates | None:
+        """Records that prove this answer as it stands; None unless they were asked for."""
+        return None if self._evidence is None else Certificates(self, self._evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Cull(_Certified):
     """Answer of `cull`.
 
     Attributes
@@ -116,7 +190,7 @@ class Cull:
 
 
 @dataclass(frozen=True, eq=False)
-class Distances:
+class Distances(_Certified):
     """Answer of `distance` and `distance_to_frustum`.
 
     Attributes
@@ -170,7 +244,7 @@ class Distances:
 
 
 @dataclass(frozen=True, eq=False)
-class Booleans:
+class Booleans(_Certified):
     """Answer of `intersects`.
 
     Attributes
@@ -194,7 +268,7 @@ class Booleans:
 
 
 @dataclass(frozen=True, eq=False)
-class FirstContacts:
+class FirstContacts(_Certified):
     """Answer of `first_contact`.
 
     Attributes

@@ -17,6 +17,8 @@ from conftest import reproducer
 from oracle.vectors import cross, dot
 from polygon_scenes import random_ring
 
+from geomsrv.answers import json_line
+from geomsrv.cli import main
 from geomsrv.verify import CertificateError, verify_record
 
 CHECKER = Path(__file__).resolve().parents[1] / "geomsrv" / "verify.py"
@@ -205,3 +207,120 @@ def test_what_is_proven_of_other_bodies_is_true_of_them(scene, rng) -> None:
                 accepted += 1
                 assert is_true(other), f"{change}\n{reproducer(**record)}"
     assert accepted > 0
+
+
+# ----------------------------------------------------------------------------------------------------- malformed
+
+
+BROKEN = {
+    "no query": lambda r: r.pop("query"),
+    "unknown query": lambda r: r.update(query="volume"),
+    "no body": lambda r: r.pop("b"),
+    "unknown kind": lambda r: r["a"].update(kind="cone"),
+    "no vertices": lambda r: r["b"].update(vertices=[]),
+    "vertex of another length": lambda r: r["b"]["vertices"].append([0.0, 0.0]),
+    "not finite": lambda r: r["b"]["vertices"].append([0.0, math.inf, 0.0]),
+    "not a number": lambda r: r["b"]["vertices"].append([0.0, "x", 0.0]),
+    "not an object": lambda r: r.update(claim=[1]),
+    "no evidence": lambda r: r.pop("evidence"),
+    "no simplex": lambda r: r["evidence"].clear(),
+    "empty simplex": lambda r: r["evidence"].update(simplex=[]),
+    "simplex of too many": lambda r: r["evidence"].update(simplex=[[0, 0]] * 5),
+    "index below": lambda r: r["evidence"].update(simplex=[[-1, 0]]),
+    "index above": lambda r: r["evidence"].update(simplex=[[0, 2]]),
+    "index no whole number": lambda r: r["evidence"].update(simplex=[[0.5, 0]]),
+    "negative radius": lambda r: r["a"].update(radius=-1.0),
+    "no lower": lambda r: r["claim"].pop("lower"),
+    "nan": lambda r: r["claim"].update(lower=math.nan),
+}
+
+
+@pytest.mark.parametrize("change", BROKEN)
+def test_broken_record_is_refused(change) -> None:
+    a = {"kind": "sphere", "radius": 1.0}
+    b = {"kind": "hull", "vertices": [[3.0, 0.0, 0.0], [4.0, 0.0, 0.0]]}
+    record = distance_record(a, b)
+    verify_record(record)
+    BROKEN[change](record)
+    with pytest.raises(CertificateError):
+        verify_record(record)
+
+
+def test_nothing_is_proven_of_what_claims_nothing() -> None:
+    verify_record({"query": "distance", "a": {"kind": "cone"}, "b": {"kind": "mesh"}, "claim": {}, "evidence": {}})
+
+
+@pytest.mark.parametrize("exponent", [-1000, -300, 300, 900])
+@pytest.mark.parametrize("scene", ["distance", "distance, plane", "first contact"])
+def test_huge_and_tiny_numbers(scene, exponent, rng) -> None:
+    """Scaled by a power of two, so the proof stays the same."""
+
+    def scaled(value, name=""):
+        if isinstance(value, dict):
+            keep = {"rotation", "axes", "time", "time_lower", "time_upper", "t_max"}
+            return {key: item if key in keep else scaled(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [scaled(item) for item in value]
+        return math.ldexp(value, exponent) if isinstance(value, float) else value
+
+    for _ in range(10):
+        record = SCENES[scene](rng)
+        verify_record(scaled(record))
+
+
+# --------------------------------------------------------------------------------------------------------- files
+
+
+def write(path, records) -> str:
+    path.write_text("".join(f"{json_line(record)}\n" for record in records))
+    return str(path)
+
+
+def test_command_proves_files(tmp_path, capsys, rng) -> None:
+    records = [scene(rng) for scene in SCENES.values() for _ in range(3)]
+    empty = {**records[0], "claim": {}}
+    good = write(tmp_path / "good.jsonl", records)
+    capsys.readouterr()
+    assert main(["verify", good]) == 0
+    assert capsys.readouterr().out == "12 records: 12 proven, 0 failed\n"
+    assert main(["verify", good, write(tmp_path / "more.jsonl", [empty])]) == 0
+    assert capsys.readouterr().out == "13 records: 12 proven, 1 claim nothing, 0 failed\n"
+
+
+def test_command_names_what_fails(tmp_path, capsys, rng) -> None:
+    records = [distance_record(box(rng), posed(rng, hull(rng))) for _ in range(6)]
+    for k in (1, 2, 3, 4):
+        records[k]["claim"]["upper"] = records[k]["claim"]["lower"] - 1.0
+    path = write(tmp_path / "bad.jsonl", records)
+    capsys.readouterr()
+    assert main(["verify", path]) == 1
+    out = capsys.readouterr().out
+    assert out.startswith(
+        f"6 records: 2 proven, 4 failed: {path}:2: lower <= distance <= upper does not hold; {path}:3: "
+    )
+    assert out.endswith("; ...\n") and out.count("\n") == 1
+
+
+def test_command_finds_a_tampered_digit(tmp_path, capsys, rng) -> None:
+    record = distance_record({"kind": "sphere", "radius": 1.0}, {"kind": "hull", "vertices": [[3.0, 4.0, 12.0]]})
+    path = tmp_path / "answer.jsonl"
+    text = write(path, [record]) and path.read_text()
+    twelve, other = (12.0).hex(), math.nextafter(12.0, 13.0).hex()
+    parts = text.split(twelve)
+    status = []
+    for k in range(1, len(parts)):
+        path.write_text(twelve.join(parts[:k]) + other + twelve.join(parts[k:]))
+        status.append(main(["verify", str(path)]))
+    assert status == [1, 1, 1, 0]  # a coordinate, lower, distance; a larger upper is true as well
+    path.write_text(text[:-40])
+    assert main(["verify", str(path)]) == 1
+
+
+def test_command_cannot_read(tmp_path, capsys) -> None:
+    assert main(["verify", str(tmp_path / "none.jsonl")]) == 2
+    assert "cannot read" in capsys.readouterr().err
+    (tmp_path / "image").write_bytes(b"\xff\xd8\xff")
+    assert main(["verify", str(tmp_path / "image")]) == 2
+    with pytest.raises(SystemExit) as stopped:
+        main(["verify"])
+    assert stopped.value.code == 2
