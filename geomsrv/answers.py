@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,13 +102,6 @@ class Cost:
     counts: dict[str, int] = field(default_factory=dict)
 
 
-class Evidence(NamedTuple):
-    """What was kept of a query to prove its answer."""
-
-    items: int
-    record: Callable[[Any, int], Record]  #: of the answer and an item of it
-
-
 @dataclass(frozen=True, eq=False)
 class Certificates:
     """Records that prove an answer, one for each item, written when they are read; see the page on certificates.
@@ -125,13 +118,13 @@ class Certificates:
     """
 
     _answer: Any = field(repr=False)
-    _evidence: Evidence = field(repr=False)
+    _record: Callable[[Any, int], Record] = field(repr=False)
 
     def __len__(self) -> int:
-        return self._evidence.items
+        return len(self._answer.state if isinstance(self._answer, Cull) else self._answer.status)
 
     def __getitem__(self, i: int) -> Record:
-        return self._evidence.record(self._answer, range(len(self))[i])
+        return self._record(self._answer, range(len(self))[i])
 
     def __iter__(self) -> Iterator[Record]:
         return (self[i] for i in range(len(self)))
@@ -163,12 +156,12 @@ def _in_hex(value: Any) -> Any:
 class _Certified:
     """An answer that can be asked for with ``certificates=True``."""
 
-    _evidence: Evidence | None = field(default=None, repr=False, kw_only=True)
+    _record: Callable[[Any, int], Record] | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def certificates(self) -> Certificates | None:
         """Records that prove this answer as it stands; None unless they were asked for."""
-        return None if self._evidence is None else Certificates(self, self._evidence)
+        return None if self._record is None else Certificates(self, self._record)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,95 +1,114 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs, answer and evidence as records that `geomsrv.verify` proves; docs/certificates.md tells what they mean.
+"""Inputs and answer as records that `geomsrv.verify` proves; docs/certificates.md tells what they mean.
 
-While a query is answered nothing happens here: a record is written from the arrays when it is read.
+While a query is answered nothing happens here: a record is made when it is read.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _validate
-from geomsrv.answers import Booleans, ContactStatus, Cull, CullState, Distances, Evidence, FirstContacts, Record
-from geomsrv.shapes import Box, Boxes, Capsule, Convex, Frustum, Frustum2D, Polygons, Shape, Sphere
+from geomsrv.answers import Booleans, ContactStatus, Cull, CullState, Distances, FirstContacts, Record
+from geomsrv.evidence import evidence_of_contact, evidence_of_cull, evidence_of_distance
+from geomsrv.shapes import (
+    Box,
+    Boxes,
+    Capsule,
+    Convex,
+    Frustum,
+    Frustum2D,
+    Point,
+    Polygons,
+    Segment,
+    Shape,
+    Sphere,
+    Triangle,
+)
 
-__all__ = ["evidence_of_contacts", "evidence_of_cull", "evidence_of_distances", "without_claim"]
+__all__ = ["certify_contacts", "certify_cull", "certify_distances", "without_claim"]
 
 FloatArray = NDArray[np.float64]
-Rows = NDArray[Any]
+Pairs = NDArray[np.int32]
+Prover = Callable[[Any, int], Record]
 
 
-def evidence_of_cull(frustum: Frustum, boxes: Boxes, simplex: Rows, beyond: Rows) -> Evidence:
-    """Records of a `Cull`: `simplex` (n, k, 2) pairs of corners, `beyond` (n, 2) corner and plane."""
+def certify_cull(frustum: Frustum, boxes: Boxes, simplex: Pairs | None = None) -> Prover:
+    """Records of a `Cull`.
+
+    `simplex`, here and below: (n, k, 2) pairs of vertices where the engine ended, unused rows -1; None if unknown.
+    """
 
     def record(answer: Cull, i: int) -> Record:
-        state = CullState(int(answer.state[i]))
-        claim, evidence = {"state": state.name} if answer.certain[i] else {}, {}
-        if state != CullState.INSIDE:
-            evidence["simplex"] = _pairs(simplex[i])
-        if state == CullState.INTERSECTS:
-            evidence["beyond"] = beyond[i].tolist()
-        return _record("cull", _item(frustum, i), _item(boxes, i), claim, evidence)
+        a, b, state = _item(frustum, i), _item(boxes, i), CullState(int(answer.state[i])).name
+        if not answer.certain[i]:
+            return _record("cull", a, b, {}, {})
+        return _record("cull", a, b, {"state": state}, evidence_of_cull(a, b, state, _listed(simplex, i)))
 
-    return Evidence(len(simplex), record)
+    return record
 
 
-def evidence_of_distances(
-    a: Any, b: Any, simplex: Rows, *, poses_ab: FloatArray | None = None, signed: bool = False, normals: bool = True
-) -> Evidence:
-    """Records of `Distances` or `Booleans` of batches, or of shapes with poses: `simplex` (n, k, 2) pairs of vertices.
+def certify_distances(
+    a: Any, b: Any, simplex: Pairs | None = None, *, poses_ab: FloatArray | None = None, signed: bool = False
+) -> Prover:
+    """Records of `Distances` or `Booleans` of batches, of a frustum and points, or of shapes at poses.
 
-    `signed`: negative distances are penetration depths.  `normals`: the answer's normals are evidence too.
+    `signed`: negative distances are penetration depths.
     """
 
     def record(answer: Distances | Booleans, i: int) -> Record:
         sides = _item(a, i), _item(b, i)
         if poses_ab is not None:
-            sides[1].update(_pose(poses_ab[0 if len(poses_ab) == 1 else i]))
-        evidence: Record = {"simplex": _pairs(simplex[i])}
+            sides[1].update(_pose(poses_ab[i]))
+        claim: Record = {}
         if isinstance(answer, Booleans):
-            claim: Record = {"meets": bool(answer.value[i])} if answer.certain[i] else {}
-            return _record("distance", *sides, claim, evidence)
-        lower, value, upper = (float(column[i]) for column in (answer.lower, answer.distance, answer.upper))
-        if normals and np.isfinite(answer.normal[i]).all():
-            evidence["directions"] = [answer.normal[i].tolist()]
-        if not lower <= upper:  # unsupported
+            if answer.certain[i]:
+                claim["meets"] = bool(answer.value[i])
+        elif answer.lower[i] <= answer.upper[i]:  # otherwise it is unsupported
+            if answer.lower[i] > 0.0 or answer.upper[i] <= 0.0:
+                claim["meets"] = bool(answer.upper[i] <= 0.0)
+            claim |= {"signed": signed} | {name: float(getattr(answer, name)[i]) for name in _INTERVAL}
+            claim["upper"] = max(claim["upper"], _least_upper(*sides))
+        if not claim or not all(side["kind"] in _POLYTOPES for side in sides):
             return _record("distance", *sides, {}, {})
-        claim = {"meets": lower <= 0.0} if lower > 0.0 or upper <= 0.0 else {}
-        claim |= {"signed": signed, "lower": lower, "distance": value, "upper": max(upper, _least_upper(*sides))}
-        return _record("distance", *sides, claim, evidence)
+        normal = answer.normal[i].tolist() if isinstance(answer, Distances) and signed else None
+        return _record("distance", *sides, claim, evidence_of_distance(*sides, _listed(simplex, i), normal))
 
-    return Evidence(len(simplex), record)
+    return record
+
+
+_INTERVAL = ("lower", "distance", "upper")
+_POLYTOPES = ("box", "frustum", "hull", "polygon", "sphere", "capsule")  #: kinds that are such, but for a radius
 
 
 def _least_upper(a: Record, b: Record) -> float:
     """Least upper bound that can be proven: of overlapping cores no depth is, only that of the radii around them."""
     p, q = a.get("radius", 0.0), b.get("radius", 0.0)
-    return -math.nextafter(p + q, 0.0) if p and q else -(p + q)
+    return 0.0 - (math.nextafter(p + q, 0.0) if p and q else p + q)
 
 
-def evidence_of_contacts(
-    a: Polygons, b: Polygons, velocities: tuple[FloatArray, FloatArray], t_max: float, axis: Rows, simplex: Rows
-) -> Evidence:
-    """Records of `FirstContacts` of polygons: `axis` (n, 4) side, i, j, k and `simplex` (n, k, 2) pairs of vertices."""
+def certify_contacts(a: Any, b: Any, velocities: tuple[FloatArray, FloatArray], t_max: float) -> Prover:
+    """Records of `FirstContacts` of polygons."""
 
     def record(answer: FirstContacts, i: int) -> Record:
         sides = _item(a, i), _item(b, i)
         for side, velocity in zip(sides, velocities, strict=True):
             side["velocity"] = velocity[0 if len(velocity) == 1 else i].tolist()
-        status = ContactStatus(int(answer.status[i]))
-        claim: Record = {"status": status.name, "t_max": t_max}
-        evidence: Record = {"axis": axis[i].tolist()}
-        if status != ContactStatus.NEVER:
+        if answer.status[i] in (ContactStatus.UNSUPPORTED, ContactStatus.NOT_CONVERGED):
+            return _record("first_contact", *sides, {}, {})
+        status = ContactStatus(int(answer.status[i])).name
+        claim: Record = {"status": status, "t_max": t_max}
+        if status != "NEVER":
             claim |= {name: float(getattr(answer, name)[i]) for name in ("time_lower", "time", "time_upper")}
-            evidence["simplex"] = _pairs(simplex[i])
-        return _record("first_contact", *sides, claim, evidence)
+        return _record("first_contact", *sides, claim, evidence_of_contact(*sides, status, t_max))
 
-    return Evidence(len(simplex), record)
+    return record
 
 
 def without_claim(query: str, a: Any, b: Any) -> Record:
@@ -101,9 +120,8 @@ def _record(query: str, a: Record, b: Record, claim: Record, evidence: Record) -
     return {"query": query, "a": a, "b": b, "claim": claim, "evidence": evidence}
 
 
-def _pairs(rows: Rows) -> list[list[int]]:
-    """Pairs of vertices; rows that are not needed hold -1."""
-    return [pair for pair in rows.tolist() if pair[0] >= 0]
+def _listed(simplex: Pairs | None, i: int) -> list[list[int]]:
+    return [] if simplex is None else [pair for pair in simplex[i].tolist() if pair[0] >= 0]
 
 
 # ------------------------------------------------------------------------------------------------------- bodies
@@ -112,8 +130,8 @@ def _pairs(rows: Rows) -> list[list[int]]:
 def _item(side: Any, i: int) -> Record:
     """Item i of a batch, or the only one; or a shape, in its own frame."""
     if isinstance(side, (Frustum, Frustum2D)):
-        flat = {"origin": side.origin.tolist(), "axes": side.axes.tolist(), "bounds": list(side.bounds)}
-        return {"kind": "frustum", **flat, "near": side.near, "far": side.far}
+        window = {"origin": side.origin.tolist(), "axes": side.axes.tolist(), "bounds": list(side.bounds)}
+        return {"kind": "frustum", **window, "near": side.near, "far": side.far}
     if isinstance(side, Shape):
         return _shape(side)
     if isinstance(side, np.ndarray):  # points
@@ -125,12 +143,7 @@ def _item(side: Any, i: int) -> Record:
 
 
 def _box(center: FloatArray, axes: FloatArray, half_extents: FloatArray) -> Record:
-    return {
-        "kind": "box",
-        "center": center.tolist(),
-        "axes": axes.tolist(),
-        "half_extents": half_extents.tolist(),
-    }
+    return {"kind": "box", "center": center.tolist(), "axes": axes.tolist(), "half_extents": half_extents.tolist()}
 
 
 def _shape(shape: Shape) -> Record:
@@ -140,8 +153,8 @@ def _shape(shape: Shape) -> Record:
         return {"kind": "capsule", "half_length": shape.length / 2.0, "radius": shape.radius}
     if isinstance(shape, Box):
         return _box(np.zeros(3), np.eye(3), shape.half_extents)
-    if isinstance(shape, Convex) or shape.kind in ("point", "segment", "triangle"):
-        return {"kind": "hull", "vertices": shape.vertices.tolist()}  # type: ignore[attr-defined]
+    if isinstance(shape, (Convex, Point, Segment, Triangle)):
+        return {"kind": "hull", "vertices": shape.vertices.tolist()}
     return {"kind": shape.kind}  # nothing is claimed of it
 
 

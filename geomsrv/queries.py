@@ -20,6 +20,7 @@ from geomsrv.answers import (
     DistanceStatus,
     FirstContacts,
 )
+from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
 from geomsrv.shapes import Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
 
@@ -40,7 +41,7 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     accuracy : str
         Tier; see the numerics page.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -71,10 +72,11 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
     tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
+    certified = _validate.certificates(certificates, tier)
     state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents)
     stages = dict(zip(("bound", "filter", "uncertain"), counts, strict=True))
-    return Cull(state, certain, Cost(time.perf_counter_ns() - start, tier, stages))
+    cost = Cost(time.perf_counter_ns() - start, tier, stages)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes) if certified else None)
 
 
 def distance_to_frustum(
@@ -98,7 +100,7 @@ def distance_to_frustum(
     want : tuple of str
         "distance", and "witness" to find the nearest points right away instead of on first use.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -132,7 +134,7 @@ def distance_to_frustum(
     )
     array = _validate.floats(points, "points", (None, dimension))
     tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
+    certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
     packed = frustum.packed()
     gap, lower, upper, region, point_a = kernel(packed, array, "witness" in effects)
@@ -145,6 +147,7 @@ def distance_to_frustum(
         cost=Cost(time.perf_counter_ns() - start, tier, {"filter": len(array)}),
         region=region,
         _point_a=point_a if point_a is not None else lambda: cast(FloatArray, kernel(packed, array, True)[4]),
+        _record=certify_distances(frustum, array) if certified else None,
     )
 
 
@@ -174,7 +177,7 @@ def first_contact(
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -212,7 +215,8 @@ def first_contact(
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
     tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
+    certified = _validate.certificates(certificates, tier)
+    proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
         nothing = np.full(count, np.nan)
         return FirstContacts(
@@ -226,11 +230,13 @@ def first_contact(
             np.zeros(count + 1, np.int64),
             Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
             "first contact of polytopes is unsupported in this version",
+            _record=proof,
         )
     answer = _core.first_contact_polygons(
         a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set)
     )
-    return FirstContacts(*answer, Cost(time.perf_counter_ns() - start, tier, {"filter": count}))
+    cost = Cost(time.perf_counter_ns() - start, tier, {"filter": count})
+    return FirstContacts(*answer, cost, _record=proof)
 
 
 def distance(
@@ -240,6 +246,7 @@ def distance(
     *,
     accuracy: str = "float64",
     want: tuple[str, ...] = ("distance",),
+    certificates: bool = False,
 ) -> Distances:
     """How far apart bodies are, their nearest points, and how deep they overlap.
 
@@ -253,6 +260,8 @@ def distance(
         Tier; see the numerics page.
     want : tuple of str
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
+    certificates : bool
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -278,16 +287,18 @@ def distance(
     """
     start = time.perf_counter_ns()
     tier = _validate.accuracy(accuracy)
+    certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness", "penetration"))
+    signed, poses = "penetration" in effects, None
     if poses_ab is None:
-        answer, message = _batch_distance(a, b, "penetration" in effects), ""
+        answer, message = _batch_distance(a, b, signed), ""
     else:
         shapes: list[Any] = [a, b]
         for shape, name in zip(shapes, "ab", strict=True):
             _expect(shape, (Shape, Frustum), name)
         poses = _validate.poses(poses_ab, "poses_ab")
         pairs = np.broadcast_to(np.array([0, 1]), (len(poses), 2))
-        answer = _core.distance_pairs(*pack(shapes), np.ascontiguousarray(pairs), poses, "penetration" in effects)
+        answer = _core.distance_pairs(*pack(shapes), np.ascontiguousarray(pairs), poses, signed)
         unsupported = (answer[6] == DistanceStatus.UNSUPPORTED).any()
         kinds = "-".join(shape.kind for shape in shapes)
         message = f"distance {kinds} is unsupported in this version" if unsupported else ""
@@ -304,11 +315,17 @@ def distance(
         _point_a=point_a,
         _normal=normal,
         message=message,
+        _record=certify_distances(a, b, poses_ab=poses, signed=signed) if certified else None,
     )
 
 
 def intersects(
-    a: Shape | Batch, b: Shape | Batch, poses_ab: ArrayLike | None = None, *, accuracy: str = "float64"
+    a: Shape | Batch,
+    b: Shape | Batch,
+    poses_ab: ArrayLike | None = None,
+    *,
+    accuracy: str = "float64",
+    certificates: bool = False,
 ) -> Booleans:
     """Whether bodies touch or overlap now.
 
@@ -318,6 +335,8 @@ def intersects(
         Bodies, as for `distance`.
     accuracy : str
         Tier; see the numerics page.
+    certificates : bool
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -336,13 +355,14 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
-    answer = distance(a, b, poses_ab, accuracy=accuracy, want=("penetration",))
+    answer = distance(a, b, poses_ab, accuracy=accuracy, want=("penetration",), certificates=certificates)
     return Booleans(
         value=answer.distance <= 0.0,
         certain=(answer.lower > 0.0) | (answer.upper < 0.0),
         status=answer.status,
         cost=answer.cost,
         message=answer.message,
+        _record=answer._record,
     )
 
 

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from certificate_records import contact_record, cull_record, distance_record, falsified, is_true
-from conftest import reproducer
+from conftest import from_hex, hard_cases, reproducer
 from oracle.vectors import cross, dot
-from polygon_scenes import random_ring
+from polygon_scenes import polygons, random_ring
 
+import geomsrv as gs
 from geomsrv.answers import json_line
 from geomsrv.cli import main
 from geomsrv.verify import CertificateError, verify_record
@@ -41,7 +42,7 @@ def test_checker_imports_the_standard_library_only() -> None:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0
             names.add(node.module)
-    assert names == {"__future__", "collections.abc", "fractions", "itertools", "json", "math", "typing"}
+    assert names == {"__future__", "collections.abc", "copy", "fractions", "itertools", "json", "math", "typing"}
     assert "import" not in {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
 
 
@@ -324,3 +325,47 @@ def test_command_cannot_read(tmp_path, capsys) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["verify"])
     assert stopped.value.code == 2
+
+
+# ------------------------------------------------------------------------------------------- what queries answer
+
+
+def corpus_batches():
+    """The hard cases as queries: an answer with certificates each."""
+    for case in hard_cases("frustum_box"):
+        f, b = (from_hex(case["input"])[name] for name in ("frustum", "box"))
+        view = gs.Frustum(f["E"], [f["L"], f["U"], f["D"]], f["l"], f["u"], f["n"], f["f"])
+        yield case["id"], lambda t, v=view, b=b: gs.cull(v, gs.Boxes([b["C"]], [b["A"]], [b["e"]]), **t)
+    for case in hard_cases("point_frustum"):
+        given = from_hex(case["input"])
+        f = given["frustum"]
+        view = gs.Frustum(f["E"], [f["L"], f["U"], f["D"]], f["l"], f["u"], f["n"], f["f"])
+        yield case["id"], lambda t, v=view, p=given["point"]: gs.distance_to_frustum(v, [p], **t)
+    for case in hard_cases("box_box_distance"):
+        a, b = (gs.Boxes([x["C"]], [x["A"]], [x["e"]]) for x in (from_hex(case["input"])[k] for k in ("box0", "box1")))
+        yield case["id"], lambda t, a=a, b=b: gs.distance(a, b, want=("penetration",), **t)
+        yield case["id"], lambda t, a=a, b=b: gs.intersects(a, b, **t)
+    for case in hard_cases("polygon2d_distance"):
+        a, b = (polygons(from_hex(case["input"])[k]) for k in "PQ")
+        yield case["id"], lambda t, a=a, b=b: gs.distance(a, b, want=("penetration",), **t)
+    for case in hard_cases("polygon2d_moving"):
+        given = from_hex(case["input"])
+        a, b = (polygons(given[k]) for k in "PQ")
+        yield (
+            case["id"],
+            lambda t, a=a, b=b, g=given: gs.first_contact(a, b, g["velP"], g["velQ"], t_max=g["tmax"], **t),
+        )
+
+
+@pytest.mark.parametrize("tier", ["float64"])
+def test_hard_cases_are_proven(tier) -> None:
+    claims: Counter[str] = Counter()
+    for name, ask in corpus_batches():
+        answer = ask({"accuracy": tier, "certificates": True})
+        try:
+            gs.verify(answer)
+        except CertificateError as fault:
+            raise AssertionError(f"{name}: {fault}\n{next(answer.certificates.lines())}") from fault
+        (record,) = answer.certificates
+        claims[record["query"], bool(record["claim"])] += 1
+    assert claims["cull", True] > 50 and claims["distance", True] > 200 and claims["first_contact", True] > 50, claims
