@@ -277,6 +277,8 @@ class FirstContacts(_Certified):
     points : (k, d) float64, point_offsets : (n + 1,) int64
         Contact set of item i: ``points[point_offsets[i]:point_offsets[i + 1]]``, one point, the two ends of a segment,
         or the counter-clockwise intersection polygon of bodies that overlap at the start.
+    certain : (n,) bool
+        True where exact arithmetic is proven to give the same ``status``.
     message : str
         Names what is unsupported; empty otherwise.
     cost : Cost
@@ -290,5 +292,6 @@ class FirstContacts(_Certified):
     normal: FloatArray
     points: FloatArray
     point_offsets: IntArray
+    certain: BoolArray
     cost: Cost
     message: str = ""

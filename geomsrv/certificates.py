@@ -100,7 +100,7 @@ def certify_contacts(a: Any, b: Any, velocities: tuple[FloatArray, FloatArray], 
         sides = _item(a, i), _item(b, i)
         for side, velocity in zip(sides, velocities, strict=True):
             side["velocity"] = velocity[0 if len(velocity) == 1 else i].tolist()
-        if answer.status[i] in (ContactStatus.UNSUPPORTED, ContactStatus.NOT_CONVERGED):
+        if not answer.certain[i]:
             return _record("first_contact", *sides, {}, {})
         status = ContactStatus(int(answer.status[i])).name
         claim: Record = {"status": status, "t_max": t_max}

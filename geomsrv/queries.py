@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -28,6 +29,8 @@ __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersec
 
 FloatArray = NDArray[np.float64]
 Batch = Boxes | Polygons | Polytopes | Frustum
+
+TIERS = ("bound", "float32", "float64", "exact")  #: of queries that answer at all of them
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -214,7 +217,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -228,14 +231,15 @@ def first_contact(
             np.full((count, d), np.nan),
             np.zeros((0, d)),
             np.zeros(count + 1, np.int64),
+            np.zeros(count, np.bool_),
             Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
             "first contact of polytopes is unsupported in this version",
             _record=proof,
         )
-    answer = _core.first_contact_polygons(
-        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set)
+    *answer, rungs = _core.first_contact_polygons(
+        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
     )
-    cost = Cost(time.perf_counter_ns() - start, tier, {"filter": count})
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs))
     return FirstContacts(*answer, cost, _record=proof)
 
 
@@ -286,10 +290,13 @@ def distance(
     array([-0.5])
     """
     start = time.perf_counter_ns()
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS if poses_ab is None and isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness", "penetration"))
     signed, poses = "penetration" in effects, None
+    if poses_ab is None and isinstance(a, Polygons):
+        found = _polygon_distance(a, b, signed, tier, start)
+        return replace(found, _record=certify_distances(a, b, signed=signed)) if certified else found
     if poses_ab is None:
         answer, message = _batch_distance(a, b, signed), ""
     else:
@@ -358,7 +365,7 @@ def intersects(
     answer = distance(a, b, poses_ab, accuracy=accuracy, want=("penetration",), certificates=certificates)
     return Booleans(
         value=answer.distance <= 0.0,
-        certain=(answer.lower > 0.0) | (answer.upper < 0.0),
+        certain=(answer.lower > 0.0) | (answer.upper <= 0.0),
         status=answer.status,
         cost=answer.cost,
         message=answer.message,
@@ -366,13 +373,36 @@ def intersects(
     )
 
 
+def _polygon_distance(a: Polygons, b: Any, penetration: bool, tier: str, start: int) -> Distances:
+    """The engine's answer for polygons."""
+    _expect(b, Polygons, "b")
+    _common_length(len(a), len(b))
+    gap, lower, upper, point_a, point_b, normal, status, rungs = _core.distance_polygons(
+        a.vertices, a.offsets, b.vertices, b.offsets, penetration, tier
+    )
+    return Distances(
+        distance=gap,
+        lower=lower,
+        upper=upper,
+        point_b=point_b,
+        status=status,
+        cost=Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs)),
+        _point_a=point_a,
+        _normal=normal,
+    )
+
+
+def _stages(tier: str, rungs: tuple[int, int, int]) -> dict[str, int]:
+    """Items by what it took to answer them."""
+    names = ("bound" if tier == "bound" else "filter", "wide", "exact")
+    return dict(zip(names, rungs if tier == "exact" else rungs[:1], strict=False))
+
+
 def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:
     """The engine's answer for two batches in world coordinates."""
     _expect(a, (Boxes, Polygons, Polytopes, Frustum), "a")
-    _expect(b, (Polygons,) if isinstance(a, Polygons) else (Boxes, Polytopes, Frustum), "b")
+    _expect(b, (Boxes, Polytopes, Frustum), "b")
     _common_length(_length(a), _length(b))
-    if isinstance(a, Polygons):
-        return _core.distance_polygons(a.vertices, a.offsets, b.vertices, b.offsets, penetration)
     if isinstance(a, Boxes) and isinstance(b, Boxes):
         return _core.distance_boxes(a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration)
     if isinstance(a, Boxes):

@@ -357,7 +357,7 @@ def corpus_batches():
         )
 
 
-@pytest.mark.parametrize("tier", ["float64"])
+@pytest.mark.parametrize("tier", ["float64", "exact"])
 def test_hard_cases_are_proven(tier) -> None:
     claims: Counter[str] = Counter()
     for name, ask in corpus_batches():
