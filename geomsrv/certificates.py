@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _validate
-from geomsrv.answers import Booleans, ContactStatus, Cull, CullState, Distances, FirstContacts, Record
+from geomsrv.answers import Booleans, ContactStatus, Cull, CullState, Distances, DistanceStatus, FirstContacts, Record
 from geomsrv.evidence import evidence_of_contact, evidence_of_cull, evidence_of_distance
 from geomsrv.shapes import (
     Box,
@@ -70,7 +70,7 @@ def certify_distances(
         if isinstance(answer, Booleans):
             if answer.certain[i]:
                 claim["meets"] = bool(answer.value[i])
-        elif answer.lower[i] <= answer.upper[i]:  # otherwise it is unsupported
+        elif answer.status[i] != DistanceStatus.UNSUPPORTED:
             if answer.lower[i] > 0.0 or answer.upper[i] <= 0.0:
                 claim["meets"] = bool(answer.upper[i] <= 0.0)
             claim |= {"signed": signed} | {name: float(getattr(answer, name)[i]) for name in _INTERVAL}

@@ -32,11 +32,7 @@ __all__ = ["evidence_of_contact", "evidence_of_cull", "evidence_of_distance"]
 Record = dict[str, Any]
 Pairs = list[list[int]]
 
-# Vertices this near to the highest along the normal of a depth, as a share of the extent along it, may belong to the
-# facet that is meant: a rounded normal is good to a few 2^-53.
-LEVEL = Fraction(1, 2**40)
-
-MOST = 12  # of those are tried with each other; more than this only lie in one plane
+MOST = 12  #: vertices of each body that are tried for a facet; any three of a larger one will do
 
 
 def evidence_of_distance(a: Record, b: Record, start: Pairs, normal: list[float] | None = None) -> Record:
@@ -77,7 +73,8 @@ def evidence_of_contact(a: Record, b: Record, status: str, t_max: float) -> Reco
         elif status == "TOUCHING":
             found = [clip for clip in clips if clip.gap == 0]
         else:  # they are apart until the last gap has closed
-            found = sorted((clip for clip in clips if clip.time), key=lambda clip: clip.time or 0)[-1:]
+            closing = [clip for clip in clips if clip.time]
+            found = [max(closing, key=lambda clip: clip.time or 0)] if closing else []
         if found:
             evidence["axis"], _, time = found[0]
             if status == "NEVER":
@@ -113,6 +110,7 @@ def _every_axis(pair: Pair) -> Iterator[list[int]]:
     for side, points in enumerate((pair.a, pair.b)):
         yield from ([side, i, j, 0] for i, j in combinations(range(len(points)), 2))
     yield from ([4, i, 0, k] for i, k in product(range(len(pair.a)), range(len(pair.b))))
+    yield [5, 0, 0, 0]
 
 
 def _simplex(a: Sequence[Vector], b: Sequence[Vector], start: Pairs) -> Pairs:
@@ -130,18 +128,20 @@ def _simplex(a: Sequence[Vector], b: Sequence[Vector], start: Pairs) -> Pairs:
 
 
 def _facet(pair: Pair, normal: Vector) -> Pairs:
-    """Pairs whose differences lie in the facet of b - a that is across the normal, as far as that can be told."""
-    tops = []
-    for points, sign in ((pair.a, 1), (pair.b, -1)):
-        heights = [sign * dot(normal, v) for v in points]
-        level = max(heights) - LEVEL * (max(heights) - min(heights))
-        tops.append(sorted((i for i, h in enumerate(heights) if h >= level), key=lambda i: -heights[i])[:MOST])
-    (i, *others_a), (j, *others_b) = tops
-    others = [[k, j] for k in others_a] + [[i, k] for k in others_b]
+    """Pairs whose differences span a facet of b - a: from the normal on, each time the one with the largest gap."""
 
-    def largest(facet: Pairs) -> Fraction:
-        normals = [n for n in normals_to(pair.differences(facet)) if any(n)]
-        return max(Fraction(gap * abs(gap), dot(n, n)) for n, gap in zip(normals, map(pair.gap, normals), strict=True))
+    def measured(facet: Pairs) -> tuple[Fraction, Vector]:
+        gaps = ((pair.gap(n), n) for n in normals_to(pair.differences(facet)))
+        return max(((Fraction(gap * abs(gap), dot(n, n)), n) for gap, n in gaps), key=lambda found: found[0])
 
-    size = min(len(pair.a[0]) - 1, len(others))
-    return max(([[i, j], *some] for some in combinations(others, size)), key=largest)
+    best, found = None, [[0, 0]]
+    while True:
+        highest = sorted(range(len(pair.a)), key=lambda k: -dot(normal, pair.a[k]))
+        lowest = sorted(range(len(pair.b)), key=lambda k: dot(normal, pair.b[k]))
+        (i, *others_a), (j, *others_b) = highest[:MOST], lowest[:MOST]
+        others = [[k, j] for k in others_a] + [[i, k] for k in others_b]
+        facets = [[[i, j], *some] for some in combinations(others, min(len(normal) - 1, len(others)))]
+        (size, normal), facet = max(((measured(facet), facet) for facet in facets), key=lambda found: found[0][0])
+        if best is not None and size <= best:
+            return found
+        best, found = size, facet

@@ -236,11 +236,11 @@ def first_contact(
             "first contact of polytopes is unsupported in this version",
             _record=proof,
         )
-    *answer, rungs = _core.first_contact_polygons(
+    answer = _core.first_contact_polygons(
         a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
     )
-    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs))
-    return FirstContacts(*answer, cost, _record=proof)
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
+    return FirstContacts(*answer[:-1], cost, _record=proof)
 
 
 def distance(

@@ -203,12 +203,13 @@ def nearest(points: Sequence[Vector]) -> tuple[list[int], int, Sequence[int]]:
 
 
 def normals_to(corners: Sequence[Vector]) -> list[list[int]]:
-    """Directions across the corners of a facet, and of less than a facet some of those across it."""
+    """Both directions across a facet; of corners that span less, some of those across them."""
+    plane = len(corners[0]) == 2
     arms = [sum_of(p, -1, corners[0]) for p in corners[1:]]
-    arms += [[int(i == k) for i in range(len(corners[0]))] for k in range(len(corners[0]))]
-    flat = len(corners[0]) == 2
-    found = [across((0, 0), p) for p in arms] if flat else [cross(p, q) for p, q in combinations(arms, 2)]
-    return [[sign * x for x in n] for n in found for sign in (1, -1)]
+    if len(arms) < len(corners[0]) - 1 or not any(arms[0] if plane else cross(*arms)):
+        arms += [[int(i == k) for i in range(len(corners[0]))] for k in range(len(corners[0]))]
+    found = [across((0, 0), p) for p in arms] if plane else [cross(p, q) for p, q in combinations(arms, 2)]
+    return [[sign * x for x in n] for n in found for sign in (1, -1) if any(n)]
 
 
 # ------------------------------------------------------------------------------------------------------- claims
@@ -241,9 +242,9 @@ def _distance(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fields)
     if "distance" in claim:
         lower, value, upper = (_float(claim[name]) for name in ("lower", "distance", "upper"))
         _require(lower <= value <= upper, "lower <= distance <= upper does not hold")
-        trivial = lower <= 0.0 and not claim.get("signed")
-        _require(trivial or lower == -math.inf or at_least(lower), "lower is not proven")
-        _require(upper == math.inf or at_most(upper), "upper is not proven")
+        signed = claim.get("signed", False)
+        _require((lower <= 0.0 and not signed) or lower == -math.inf or at_least(lower), "lower is not proven")
+        _require((upper >= 0.0 or signed) and (upper == math.inf or at_most(upper)), "upper is not proven")
 
 
 # Corners of a frustum's faces near, far, left (+L), right, up (+U), down.
@@ -312,8 +313,11 @@ def axis_of(pair: Pair, speed: Vector, axis: Sequence[int]) -> list[int]:
         n = across(points[i], points[j])
     elif side in (2, 3):  # across the relative velocity, along it
         n = across((0, 0), speed) if side == 2 else list(speed)
-    else:  # from vertex i of a to vertex k of b
+    elif side == 4:  # from vertex i of a to vertex k of b
         (n,) = pair.differences([(i, k)])
+    else:  # along x
+        _require(side == 5, "axis: no such side")
+        n = [1, 0]
     return max(n, [-x for x in n], key=pair.gap)
 
 
