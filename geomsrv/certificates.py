@@ -74,7 +74,8 @@ def certify_distances(
             if answer.lower[i] > 0.0 or answer.upper[i] <= 0.0:
                 claim["meets"] = bool(answer.upper[i] <= 0.0)
             claim |= {"signed": signed} | {name: float(getattr(answer, name)[i]) for name in _INTERVAL}
-            claim["upper"] = max(claim["upper"], _least_upper(*sides))
+            if signed:
+                claim["upper"] = max(claim["upper"], _least_upper(*sides))
         if not claim or not all(side["kind"] in _POLYTOPES for side in sides):
             return _record("distance", *sides, {}, {})
         normal = answer.normal[i].tolist() if isinstance(answer, Distances) and signed else None

@@ -31,6 +31,13 @@ FloatArray = NDArray[np.float64]
 Batch = Boxes | Polygons | Polytopes | Frustum
 
 TIERS = ("bound", "float32", "float64", "exact")  #: of queries that answer at all of them
+CULL_STAGES = ("bound", "filter", "wide", "exact", "uncertain")  # in the order in which the engine counts
+CULL_COUNTS = {
+    "bound": ("bound", "uncertain"),
+    "float32": ("bound", "filter", "uncertain"),
+    "float64": ("bound", "filter", "uncertain"),
+    "exact": ("bound", "filter", "wide", "exact"),
+}
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -74,10 +81,10 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
-    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents)
-    stages = dict(zip(("bound", "filter", "uncertain"), counts, strict=True))
+    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
     return Cull(state, certain, cost, _record=certify_cull(frustum, boxes) if certified else None)
 
