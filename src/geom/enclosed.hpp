@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "geom/double_double.hpp"
@@ -12,6 +13,13 @@
 #include "geom/rounding.hpp"
 
 namespace geomsrv {
+
+/// What had to be climbed to for an answer.
+enum class Rung : std::uint8_t {
+    filter,  ///< float64 was proven right as it was
+    wide,    ///< double-double with error bounds
+    exact,
+};
 
 /// A number and how far the exact one may be from it.
 struct Enclosed {
@@ -34,6 +42,9 @@ inline constexpr double kNoUnderflow = 0x1p-960;
 /// Known to be zero.
 inline bool is_zero(const Enclosed& x) { return x.value.hi == 0.0 && x.error == 0.0; }
 
+// A product of two doubles has 106 bits: if it is larger than this, all of them are above 2^-1022.
+inline constexpr double kWholeProduct = 0x1p-900;
+
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble sum = a.value + b.value;
@@ -55,6 +66,7 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble product = a.value * b.value;
     const double size_a = std::fabs(a.value.hi);
     const double size_b = std::fabs(b.value.hi);
+    // Of two doubles the product is found without rest, unless it is so small that parts of it underflow.
     const bool exact = a.value.lo == 0.0 && b.value.lo == 0.0;
     const double rounding = exact ? 0.0 : kWideRoundoff * std::fabs(product.hi);
     const bool whole = is_zero(a) || is_zero(b) || (exact && std::fabs(product.hi) > kNoUnderflow);
