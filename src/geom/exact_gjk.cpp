@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 namespace geomsrv {
 
@@ -395,6 +396,9 @@ ExactSeparation exact_separation(const ExactAndRough& a, const ExactAndRough& b,
         }
     }
     std::optional<ExactSeparation> found = Search<Exact>(a, b).from(simplex);
+    if (!found) {
+        throw std::logic_error("exact_separation: every step shortens v, yet there was no last one");
+    }
     found->rung = Rung::exact;
     return *found;
 }
