@@ -26,8 +26,10 @@ struct Enclosed {
 // Rounding of the error bounds themselves: fewer than 16 roundings each, all of positive numbers.
 inline constexpr double kBoundRounding = 1.0 + 16 * kUnitRoundoff;
 
-// Parts of a product that leave the normal range lose at most a few 2^-1074 each.
+// Parts of a product that leave the normal range lose at most a few 2^-1074 each.  The last bit of a product
+// of doubles is 2^-105 of it, so larger ones lose nothing.
 inline constexpr double kEnclosedUnderflow = 0x1p-1060;
+inline constexpr double kSurelyNormal = 0x1p-900;
 
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
@@ -47,10 +49,19 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
     const bool exact = a.value.lo == 0.0 && b.value.lo == 0.0;
     const double rounding = exact ? 0.0 : kWideRoundoff * std::fabs(product.hi);
     const bool zero = (size_a == 0.0 && a.error == 0.0) || (size_b == 0.0 && b.error == 0.0);
+    const bool kept = std::fabs(product.hi) > kSurelyNormal && a.error == 0.0 && b.error == 0.0;
     return {product,
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
-                (zero ? 0.0 : kEnclosedUnderflow)};
+                (zero || kept ? 0.0 : kEnclosedUnderflow)};
 }
+
+/// 2 a, which rounds nothing.
+inline Enclosed twice(const Enclosed& a) { return {{2.0 * a.value.hi, 2.0 * a.value.lo}, 2.0 * a.error}; }
+inline Exact twice(const Exact& a) { return a + a; }
+
+/// |a|, off by no more than a.
+inline Enclosed magnitude(const Enclosed& a) { return a.value.hi < 0.0 ? -a : a; }
+inline Exact magnitude(const Exact& a) { return a.magnitude(); }
 
 /// What `sign_of` answers where the error does not let it decide.
 inline constexpr int kUncertain = 2;
