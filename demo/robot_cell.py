@@ -216,6 +216,7 @@ def start_node() -> subprocess.Popen[bytes]:
     }
     command = [
         sys.executable,
+        "-P",  # not the folder we are in: in the source tree it would hide the installed package
         "-c",
         "import sys; from geomsrv.cli import main; sys.exit(main())",
         "node",

@@ -117,7 +117,7 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
         points.insert(points.end(), contact.points.begin(), contact.points.end());
         rows.point_offsets[i + 1] = static_cast<std::int64_t>(points.size());
         rows.certain[i] = contact.certain;
-        ++counts[static_cast<std::size_t>(contact.rung)];
+        ++counts[static_cast<std::size_t>(contact.rung) - 1];
     }
     return points;
 }
@@ -147,7 +147,7 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
         rows.point_b[i] = found.point_b;
         rows.normal[i] = found.normal;
         rows.status[i] = kOk;
-        ++counts[static_cast<std::size_t>(found.rung)];
+        ++counts[static_cast<std::size_t>(found.rung) - 1];
     }
 }
 
