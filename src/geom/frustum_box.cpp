@@ -85,6 +85,10 @@ constexpr Real kOffsetError = 3 * kRoundoff<Real>;
 template <class Real>
 constexpr Real kUnderflow = Real(0x1p14) * std::numeric_limits<Real>::denorm_min();
 
+// Near depths of which the exponent is beyond this are scaled to about 1: far from it squares of lengths
+// would leave the range of double.
+constexpr int kOrdinaryDepth = 300;
+
 // Products of rows of box axes are off by at most 1e-2, so sum e_i |n . A_i| <= |n| |e| sqrt(1.03).
 constexpr double kMaxStretch = 1.02;
 
@@ -311,8 +315,10 @@ CullPlanes<L> cull_planes(const Frustum& frustum) {
     const auto [left, up, view] = dual.row;
     CullPlanes<L> planes;
     planes.origin = frustum.origin;
-    // Cut to a range in which depths beyond that of float still are finite doubles.
-    if (!kIsDouble<Real>) planes.unit = PowerOfTwo(std::clamp(-std::ilogb(frustum.near), -1000, 1000));
+    // Near depths of about 1 keep floats in range; doubles care only about extremes.
+    const int depth = std::ilogb(frustum.near);
+    planes.scaled = !kIsDouble<Real> || std::abs(depth) > kOrdinaryDepth;
+    if (planes.scaled) planes.unit = PowerOfTwo(std::clamp(-depth, -1000, 1000));
     int count = 0;
     // Normal p * row + r * view, offset.
     const auto add = [&](double p, Vec3 row, double r, double offset) {
@@ -320,7 +326,7 @@ CullPlanes<L> cull_planes(const Frustum& frustum) {
         const double scaled_p = unit * p, scaled_r = unit * r;
         const Vec3 n = scaled_p * row + scaled_r * view;
         const Vec3 terms = std::fabs(scaled_p) * magnitudes(row) + std::fabs(scaled_r) * magnitudes(view);
-        const auto rounded_offset = static_cast<Real>(kIsDouble<Real> ? offset : planes.unit * offset);
+        const auto rounded_offset = static_cast<Real>(planes.unit * offset);
         planes.each[count++] = {static_cast<Real>(n.x),
                                 static_cast<Real>(n.y),
                                 static_cast<Real>(n.z),

@@ -8,8 +8,8 @@
 // verdict says whether it is proven.
 //
 // Three stages, each for what the one before could not decide: the six planes against the sphere around the
-// box, the six planes against the box, all 26 separating axes.  Each in double or in single precision, the
-// latter for numbers relative to the apex, in units that make the near depth about 1.
+// box, the six planes against the box, all 26 separating axes.  Each in double or in single precision, for
+// numbers relative to the apex.
 #pragma once
 
 #include <array>
@@ -59,14 +59,13 @@ struct CullPlanes {
     using Real = typename L::Real;
     static constexpr int kCount = 6, kGroups = (kCount + L::kCount - 1) / L::kCount;
     Vec3 origin;
-    PowerOfTwo unit;               ///< what lengths are multiplied by; 1 in double precision
+    PowerOfTwo unit;               ///< what lengths are multiplied by
+    bool scaled = false;           ///< unit is not 1
     PlaneLanes<L> each[kCount];    ///< one plane in all lanes, against as many boxes
     PlaneLanes<L> group[kGroups];  ///< as many planes, against one box; the last ones repeat the first
 
     /// A length that was not rounded yet.
-    GEOMSRV_INLINE Vec3 in_units(Vec3 length) const {
-        return std::is_same_v<Real, double> ? length : unit * length;
-    }
+    GEOMSRV_INLINE Vec3 in_units(Vec3 length) const { return scaled ? unit * length : length; }
 };
 
 template <class L>
@@ -139,9 +138,10 @@ struct LocalBox {
 /// Heights over each of a group of planes, as above.
 template <class L>
 struct PlaneHeights {
-    L center;      ///< s
-    L half_width;  ///< r
+    L center;  ///< s
+    L arm[3];  ///< e_i normal . A_i
     L error;
+    GEOMSRV_INLINE L half_width() const { return magnitude(arm[0]) + magnitude(arm[1]) + magnitude(arm[2]); }
 };
 
 template <class L>
@@ -152,9 +152,8 @@ GEOMSRV_INLINE PlaneHeights<L> heights_over(const PlaneLanes<L>& plane,
         return plane.x * v[0] + plane.y * v[1] + plane.z * v[2];
     };
     return {along(box.center) - plane.offset,
-            box.half_extents[0] * magnitude(along(box.axes[0])) +
-                box.half_extents[1] * magnitude(along(box.axes[1])) +
-                box.half_extents[2] * magnitude(along(box.axes[2])),
+            {box.half_extents[0] * along(box.axes[0]), box.half_extents[1] * along(box.axes[1]),
+             box.half_extents[2] * along(box.axes[2])},
             plane.error_per_length * box.reach + plane.error};
 }
 
@@ -166,7 +165,8 @@ GEOMSRV_INLINE std::uint8_t classify_by_planes(const CullPlanes<L>& planes, cons
     const typename L::Mask all_set = L(0.0F) <= L(0.0F);
     auto beyond = ~all_set, within = all_set, centre = all_set, across = ~all_set;
     for (const PlaneLanes<L>& plane : planes.group) {
-        const auto [s, r, error] = heights_over(plane, box);
+        const PlaneHeights<L> over = heights_over(plane, box);
+        const L s = over.center, r = over.half_width(), error = over.error;
         beyond = beyond | (error < s - r);
         within = within & (s + r < -error);
         centre = centre & (s < -error);
