@@ -39,7 +39,7 @@ Pairs = NDArray[np.int32]
 Prover = Callable[[Any, int], Record]
 
 
-def certify_cull(frustum: Frustum, boxes: Boxes, simplex: NDArray[np.int32], beyond: NDArray[np.int8]) -> Prover:
+def certify_cull(frustum: Frustum, boxes: Boxes, simplex: Any, beyond: Any) -> Prover:
     """Records of a `Cull`; the evidence is that of cull_evidence.hpp, (n, 4, 2) and (n, 2)."""
 
     def record(answer: Cull, i: int) -> Record:
