@@ -94,12 +94,13 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
-    tier = _validate.accuracy(accuracy, TIERS)
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
     certified = _validate.certificates(certificates, tier)
-    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
+    state, certain, counts, *evidence = _core.cull(*given, tier, certified)
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
-    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes) if certified else None)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, *evidence) if certified else None)
 
 
 def distance_to_frustum(

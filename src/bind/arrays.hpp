@@ -60,6 +60,7 @@ Output<T> empty(std::initializer_list<std::size_t> shape) {
     const char* dtype = std::is_same_v<T, double>         ? "float64"
                         : std::is_same_v<T, std::int64_t> ? "int64"
                         : std::is_same_v<T, std::int32_t> ? "int32"
+                        : std::is_same_v<T, std::int8_t>  ? "int8"
                         : std::is_same_v<T, bool>         ? "bool"
                                                           : "uint8";
     nb::list sizes;
