@@ -430,6 +430,30 @@ def test_turned_half_space_far_away(kind: str, order: str, rng: np.random.Genera
         assert encloses(answers, *exact_half_space(*placed)), reproducer(a=a, b=b, pose_a=ends[0], pose_b=ends[1])
 
 
+def floor_and_ceiling(turn_floor: Any, turn_ceiling: Any) -> gs.Scene:
+    """Solid below z = 1 and above z = 3, in the frame of each."""
+    objects = [
+        gs.SceneObject("floor", gs.HalfSpace([0, 0, 1], 1.0), [0, 0, 0, *turn_floor]),
+        gs.SceneObject("ceiling", gs.HalfSpace([0, 0, -1], -3.0), [0, 0, 0, *turn_ceiling]),
+    ]
+    scene = gs.Scene()
+    scene.apply(gs.SceneUpdate(add=objects))
+    return scene
+
+
+def test_half_spaces_turned_in_a_scene() -> None:
+    """Parallel as far as a rounded rotation lets one know: at most the gap apart.  Leaning for certain: they meet."""
+    about_z = [0.0, 0.0, 0.6, 0.8]
+    for turns in ((about_z, IDENTITY), (IDENTITY, about_z), ([0.1, 0.7, 0.1, 0.7], [0.1, 0.7, 0.1, 0.7])):
+        deep, plain = (floor_and_ceiling(*turns).distances(np.inf, want=want) for want in (DEEP, ()))
+        assert deep.lower[0] == -np.inf and plain.lower[0] == 0.0
+        assert 2.0 <= deep.upper[0] == plain.upper[0] <= 2.0 + 1e-12
+    for turn in ([0.6, 0.0, 0.0, 0.8], [1e-9, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]):
+        deep, plain = (floor_and_ceiling(turn, IDENTITY).distances(np.inf, want=want) for want in (DEEP, ()))
+        assert deep.distance[0] == deep.lower[0] == deep.upper[0] == -np.inf
+        assert plain.distance[0] == plain.lower[0] == plain.upper[0] == 0.0
+
+
 # ------------------------------------------------------------------------------------------ without depth, tiers
 
 
