@@ -430,6 +430,18 @@ def test_turned_half_space_far_away(kind: str, order: str, rng: np.random.Genera
         assert encloses(answers, *exact_half_space(*placed)), reproducer(a=a, b=b, pose_a=ends[0], pose_b=ends[1])
 
 
+def test_offset_that_cancels(rng: np.random.Generator) -> None:
+    """The plane passes the body so closely that two doubles do not hold the sum of its terms."""
+    for _ in range(300):
+        a, b = gs.Convex([rng.normal(size=3) * 10.0]), gs.HalfSpace(rng.normal(size=3), 10.0 * rng.normal())
+        pose = np.append(rng.normal(size=3) * 10.0, np.eye(4)[rng.integers(4)])  # a turn without rounding
+        for _ in range(2):
+            answer = gs.distance(a, b, pose, want=DEEP)
+            pose[:3] -= answer.normal[0] * answer.distance[0]
+        answers = gs.distance(a, b, pose, want=DEEP), gs.distance(a, b, pose)
+        assert encloses(answers, *exact_pair(a, b, pose)), reproducer(a=a, b=b, pose=pose)
+
+
 def floor_and_ceiling(turn_floor: Any, turn_ceiling: Any) -> gs.Scene:
     """Solid below z = 1 and above z = 3, in the frame of each."""
     objects = [

@@ -108,10 +108,8 @@ PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X_ls, 
     const DoubleDouble offset = DoubleDouble{own_offset, 0.0} + dot(turned, shift);
     const double size = std::abs(own_offset) + safe_norm(narrow(shift));
     const double wide_error = 8 * kWideRoundoff + (exact ? 0.0 : kInverseError);
-    // Numbers whose sum fits in two doubles have been added exactly: a low part of 0 says that nothing was
-    // rounded.
-    const double lost = offset.lo == 0.0 && exact ? 0.0 : wide_error * size;
-    return {normal.value, offset.hi, exact ? 0.0 : normal.error + wide_error, std::abs(offset.lo) + lost};
+    return {normal.value, offset.hi, exact ? 0.0 : normal.error + wide_error,
+            std::abs(offset.lo) + wide_error * size};
 }
 
 void place_hull(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch,
