@@ -156,6 +156,10 @@ public:
 
     /// The exact difference of two given points, times the scale.
     [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const;
+    /// The same, rounded, from one point to the other.
+    [[nodiscard]] Vec2 way(Vec2 from, Vec2 to) const {
+        return {scale_ * (before_ * to.x - before_ * from.x), scale_ * (before_ * to.y - before_ * from.y)};
+    }
 
     /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
     [[nodiscard]] std::size_t lowest(AxisOf axis) const;
