@@ -272,7 +272,7 @@ def repeated(rng, ring):
 
 @pytest.mark.parametrize("exponent", [-1060, -1000, -30, 0, 30, 1000])
 def test_law_witnesses_of_nearly_parallel_edges_face_each_other(rng, exponent):
-    pairs = [tuple(repeated(rng, ring) for ring in pair) for pair in nearly_parallel_pairs(rng, 1500, 2.0**exponent)]
+    pairs = [tuple(repeated(rng, ring) for ring in pair) for pair in nearly_parallel_pairs(rng, 600, 2.0**exponent)]
     answer = signed(pairs)
     reached = Counter(np.sign(answer.distance).astype(int).tolist())
     off = np.abs(answer.point_b - answer.point_a - answer.distance[:, None] * answer.normal).max(axis=1)
@@ -281,7 +281,7 @@ def test_law_witnesses_of_nearly_parallel_edges_face_each_other(rng, exponent):
         for point, ring in ((answer.point_a[i], pair[0]), (answer.point_b[i], pair[1])):
             away = exact.separation([tuple(map(float, point))], ring).signed_square
             assert away <= Fraction(2.0**-49 * largest(*pair) + FINEST) ** 2, reproducer(a=pair[0], b=pair[1])
-    assert min(reached[-1], reached[1]) >= 300, reached
+    assert min(reached[-1], reached[1]) >= 100, reached
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0**1000])

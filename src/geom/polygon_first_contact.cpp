@@ -65,6 +65,11 @@ struct Motion {
     ExactVec2 exact;  ///< the same, unrounded
     int scale_exponent = 0;
     double noise = 0.0;  ///< what rounding of the given velocities may change
+
+    /// A given velocity in these units.
+    [[nodiscard]] Vec2 scaled(Vec2 v) const {
+        return {std::scalbn(v.x, scale_exponent), std::scalbn(v.y, scale_exponent)};
+    }
 };
 
 Motion relative_motion(Vec2 velocity_a, Vec2 velocity_b) {
@@ -106,7 +111,8 @@ struct Slacks {
     double reach;
     double rate_noise;  ///< per |D|_1
     double turn_noise;
-    double rate_limit;  ///< per |D|_1
+    double rate_limit;      ///< per |D|_1
+    double rate_underflow;  ///< products with a velocity of zero are exact: at rest nothing approaches
 
     Slacks(const PolygonPair& pair, const Motion& motion)
         : gap_rounding(pair.gap_error()),
@@ -115,7 +121,8 @@ struct Slacks {
           reach(pair.reach()),
           rate_noise(motion.noise),
           turn_noise(gap_noise * (std::fabs(motion.velocity.x) + std::fabs(motion.velocity.y))),
-          rate_limit(kLargestSlack * std::max(std::fabs(motion.velocity.x), std::fabs(motion.velocity.y))) {}
+          rate_limit(kLargestSlack * std::max(std::fabs(motion.velocity.x), std::fabs(motion.velocity.y))),
+          rate_underflow(rate_limit > 0.0 ? kPairUnderflow : 0.0) {}
 
     [[nodiscard]] Slack heights() const { return {gap_noise, gap_limit}; }
 };
@@ -138,7 +145,8 @@ GEOMSRV_INLINE AxisNumbers<Real> numbers(const Real& dx, const Real& dy, const R
     const Real rate_noise =
         lesser<Real>(slacks.rate_noise * size + Real(slacks.turn_noise), slacks.rate_limit * size);
     return {gap, along_x + along_y, slacks.gap_rounding * size + gap_noise + Real(kPairUnderflow),
-            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise + Real(kPairUnderflow)};
+            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise +
+                Real(slacks.rate_underflow)};
 }
 
 constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
@@ -562,7 +570,14 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     }
     const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
     const auto moved = [&](const Mark& mark) {
-        return pair_.side(mark.side).ring[mark.vertex] + result.time * (mark.side == 0 ? a : b).velocity;
+        const Vec2 from = pair_.side(mark.side).ring[mark.vertex];
+        const Vec2 velocity = (mark.side == 0 ? a : b).velocity;
+        if (motion.scale_exponent == 0 && pair_.scale_exponent() == 0) {
+            return from + result.time * velocity;
+        }
+        // The time in seconds may be subnormal, its product with a velocity beyond the doubles.
+        const Vec2 way = moment * motion.scaled(velocity);
+        return pair_.moved(from, {way.x, 0.0}, {way.y, 0.0});
     };
     const bool one_vertex = marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex;
     const Vec2 low = moved(marks.low);

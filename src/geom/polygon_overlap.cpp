@@ -17,27 +17,22 @@ Vec2 crossing(const PolygonPair& pair, int side, std::size_t vertex, AxisOf axis
     const Vec2 to = p.ring[p.next(vertex)];
     const Vec2 base = pair.side(axis.side).ring[pair.side(axis.side).base(axis.index)];
     const ExactVec2 normal = pair.exact_axis(axis);
-    const DoubleDouble t = enclosed_dot(normal, pair.difference(base, from)).value /
-                           enclosed_dot(normal, pair.difference(to, from)).value;
-    const auto at = [&t](double start, double end) {
-        const DoubleDouble way = two_sum(end, -start);
-        // A difference beyond the largest double: the crossing lies between the ends all the same.
-        if (!std::isfinite(way.hi)) {
-            return (1.0 - t.hi) * start + t.hi * end;
-        }
-        return (DoubleDouble{start, 0.0} + t * way).hi;
-    };
-    return {at(from.x, to.x), at(from.y, to.y)};
+    const ExactVec2 way = pair.difference(to, from);
+    const DoubleDouble t =
+        enclosed_dot(normal, pair.difference(base, from)).value / enclosed_dot(normal, way).value;
+    // An edge that is level up to rounding may cross the line beyond its ends.
+    return t.hi >= 1.0 ? to : t.hi <= 0.0 ? from : pair.moved(from, t * way.x, t * way.y);
 }
 
-/// Height of v over the line through p and q, or its distance from p if they are closer than `tolerance`.
-double height(Vec2 p, Vec2 q, Vec2 v, double tolerance) {
-    const Vec2 base = q - p;
-    const double length = std::hypot(base.x, base.y);
+/// Height of v over the line through p and q, or its distance from p if they are closer than `tolerance`;
+/// scaled.
+double height(const PolygonPair& pair, Vec2 p, Vec2 q, Vec2 v, double tolerance) {
+    const Vec2 base = pair.way(p, q);
+    const double length = norm(base);
     if (!(length > tolerance)) {
-        return std::hypot(v.x - p.x, v.y - p.y);
+        return norm(pair.way(p, v));
     }
-    return std::fabs(cross((1.0 / length) * base, v - p));
+    return std::fabs(cross((1.0 / length) * base, pair.way(p, v)));
 }
 
 /// Vertices that are nearer to each other than this, scaled, are one: both may be off by as much as an axis.
@@ -114,14 +109,14 @@ std::span<const Vec2> PolygonOverlap::of(const PolygonPair& pair, Slack slack) {
 
     // Where the polygons share a line, or cross in a vertex, rounding leaves vertices that are not there in
     // truth.
-    const double tolerance = std::scalbn(merging_distance(pair, slack), -pair.scale_exponent());
+    const double tolerance = merging_distance(pair, slack);
     merged_.assign(hull.begin(), hull.end());
     for (std::size_t i = 0; merged_.size() > 1 && i < merged_.size();) {
         const std::size_t n = merged_.size();
         const Vec2 before = merged_[(i + n - 1) % n];
         const Vec2 behind = merged_[(i + 1) % n];
-        const bool repeated = std::hypot(merged_[i].x - before.x, merged_[i].y - before.y) <= tolerance;
-        if (repeated || (n > 2 && height(before, behind, merged_[i], tolerance) <= tolerance)) {
+        const bool repeated = norm(pair.way(before, merged_[i])) <= tolerance;
+        if (repeated || (n > 2 && height(pair, before, behind, merged_[i], tolerance) <= tolerance)) {
             merged_.erase(merged_.begin() + static_cast<std::ptrdiff_t>(i));
         } else {
             ++i;

@@ -372,6 +372,19 @@ ExactVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {
     return {difference_of(to.x, from.x, before_, scale_), difference_of(to.y, from.y, before_, scale_)};
 }
 
+Vec2 PolygonPair::moved(Vec2 from, DoubleDouble x, DoubleDouble y) const {
+    const auto at = [this](double start, DoubleDouble way) {
+        const double scaled = scale_ * (before_ * start);
+        // It overflows only where this coordinate is the same all over a pair that is far smaller.
+        if (!std::isfinite(scaled)) {
+            return start + std::scalbn(way.hi, -scale_exponent_);
+        }
+        const double end = (DoubleDouble{scaled, 0.0} + way).hi;
+        return scale_exponent_ == 0 ? end : std::scalbn(end, -scale_exponent_);
+    };
+    return {at(from.x, x), at(from.y, y)};
+}
+
 int PolygonPair::sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const {
     const PairedPolygon& p = side(axis.side);
     if (axis.index >= p.edges) {

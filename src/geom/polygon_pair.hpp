@@ -160,6 +160,8 @@ public:
     [[nodiscard]] Vec2 way(Vec2 from, Vec2 to) const {
         return {scale_ * (before_ * to.x - before_ * from.x), scale_ * (before_ * to.y - before_ * from.y)};
     }
+    /// A given point moved by a scaled vector, rounded once; only an end beyond the doubles is infinite.
+    [[nodiscard]] Vec2 moved(Vec2 from, DoubleDouble x, DoubleDouble y) const;
 
     /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
     [[nodiscard]] std::size_t lowest(AxisOf axis) const;
