@@ -650,6 +650,16 @@ def test_needles_meet_tip_to_tip(width):
     assert set_distance(answer.points, [(0.0, 0.0)]) == 0.0
 
 
+@pytest.mark.parametrize("width", [1e-290, 1e-308, 1e-320])
+def test_needles_cut_off_bluntly(width):
+    """The edge across the tip is all that bounds the needle there, however short it is."""
+    a = [(0.0, -width), (1e6, -1e-9), (1e6, 1e-9), (0.0, width)]
+    b = [(-2.0 - x, -y) for x, y in a]
+    answer = contact(a, b, (0, 0), (1.0, 0.0))
+    assert answer.status[0] == gs.WILL_TOUCH and answer.time[0] == 2.0
+    assert contact(a, b, (0, 0), (0.0, 1.0)).status[0] == gs.NEVER
+
+
 def test_misses_beyond_the_tip_of_a_needle_are_seen():
     """Near a sharp tip every edge normal sees a gap far below rounding; the tip's own axis sees all of it."""
     needle = [(0.0, 0.0), (1e6, -1e-6), (1e6, 1e-6)]
