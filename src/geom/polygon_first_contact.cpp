@@ -271,19 +271,6 @@ Candidates candidates_of(const PolygonPair& pair, const Window& window, AxisOf* 
     return found;
 }
 
-/// Relative error of `quotient`: Joldes, Muller, Popescu 2017, algorithm DWDivDW2, has 15; one for the bound.
-constexpr double kQuotientError = 16.0 * 0x1p-106;
-
-DoubleDouble quotient(DoubleDouble a, DoubleDouble b) {
-    const double first = a.hi / b.hi;
-    if (!(std::fabs(first) < kInfinity)) {
-        return {first, 0.0};
-    }
-    const DoubleDouble product = two_product(first, b.hi);
-    const double rest = ((a.hi - product.hi) - product.lo) + (a.lo - first * b.lo);
-    return quick_two_sum(first, rest / b.hi);
-}
-
 /// A time and proven bounds.
 struct Timed {
     DoubleDouble nominal;
