@@ -15,6 +15,10 @@ namespace {
 // and by the direction (6 u of twice the reach): 6 + 6 + 12 = 24, and something to spare.
 constexpr double kLevelError = 32 * kUnitRoundoff;
 
+// Directions whose largest entry is within these keep all their bits when they are normalised.
+constexpr double kShortestDirection = 0x1p-400;
+constexpr double kLongestDirection = 0x1p400;
+
 // Steps in doubt-free arithmetic after a float64 guess are few; this many are never seen.
 constexpr int kMostSteps = 1000;
 
@@ -212,7 +216,8 @@ Vec3 direction_of(const VectorOf<Enclosed>& v, bool& certain) {
     const Vec3 rough = {v.x.value.hi, v.y.value.hi, v.z.value.hi};
     const double size = std::max({std::fabs(rough.x), std::fabs(rough.y), std::fabs(rough.z)});
     const double error = std::max({v.x.error, v.y.error, v.z.error});
-    certain = certain && error <= kUnitRoundoff * size && size > 0x1p-400 && size < 0x1p400;
+    certain =
+        certain && error <= kUnitRoundoff * size && size > kShortestDirection && size < kLongestDirection;
     return rough;
 }
 Vec3 direction_of(const VectorOf<Exact>& v, bool&) {
