@@ -22,12 +22,6 @@ struct ExactAndRough {
     const Core& rough;  ///< the same vertices in the same order, relative to any origin, in any unit
 };
 
-enum class Rung : std::uint8_t {
-    filter,  ///< float64 was proven right as it was
-    wide,    ///< double-double with error bounds
-    exact,
-};
-
 struct ExactSeparation {
     bool meet = false;  ///< the closed bodies have a common point
     Rounding distance;  ///< correctly rounded; 0 if they meet

@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "geom/double_double.hpp"
+#include "geom/enclosed.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/polygon.hpp"
 #include "geom/vec.hpp"
@@ -81,12 +82,6 @@ struct PairedPolygon {
 /// A vector of the given numbers, unrounded: the difference of two points, or an edge's normal.
 struct ExactVec2 {
     DoubleDouble x, y;
-};
-
-/// A number and how far the exact one may be from it.
-struct Enclosed {
-    DoubleDouble value;
-    double error = 0.0;
 };
 
 /// Error of a dot product of exact vectors relative to the sum over its terms, in units of 2^-106: 7 for a

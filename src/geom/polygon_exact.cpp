@@ -1,0 +1,157 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geom/polygon_exact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geom/rounding.hpp"
+
+namespace geomsrv {
+
+namespace {
+
+/// Numbers between these, and products of two of them, have all their bits in the range of double.
+constexpr double kSmallestSafe = 0x1p-400;
+constexpr double kLargestSafe = 0x1p400;
+
+bool is_safe_double(const Enclosed& x) {
+    const double size = std::fabs(x.value.hi);
+    return x.value.lo == 0.0 && x.error == 0.0 && size > kSmallestSafe && size < kLargestSafe;
+}
+
+/// The quotient of two doubles: division rounds it correctly, the sign of the rest tells to which side.
+Rounding rounded(double n, double d) {
+    const double nearest = n / d;
+    const DoubleDouble product = two_product(nearest, d);
+    const double rest = ((n - product.hi) - product.lo) * (d < 0.0 ? -1.0 : 1.0);
+    return {nearest, rest < 0.0 ? next_down(nearest) : nearest, rest > 0.0 ? next_up(nearest) : nearest};
+}
+
+/// The root, without error where it is a double.
+Enclosed root(const Enclosed& x) {
+    if (is_safe_double(x)) {
+        const double rough = std::sqrt(x.value.hi);
+        const DoubleDouble square = two_product(rough, rough);
+        if (square.hi == x.value.hi && square.lo == 0.0) {
+            return rough;
+        }
+    }
+    return root_of(x);
+}
+
+/// Whether every number that x may be rounds to the same double.
+bool round_nearest(const Enclosed& x, double& out) {
+    const double off = x.error * kBoundRounding;
+    out = x.value.hi + next_down(x.value.lo - off);
+    return out == x.value.hi + next_up(x.value.lo + off);
+}
+
+Rounding negated(const Rounding& x) { return {-x.nearest, -x.upper, -x.lower}; }
+
+}  // namespace
+
+bool Wide::round_ratio(const Enclosed& n, const Enclosed& d, Rounding& out) {
+    if (n.value.hi == 0.0 && n.error == 0.0) {
+        out = {};
+        return true;
+    }
+    if (is_safe_double(n) && is_safe_double(d)) {
+        out = rounded(n.value.hi, d.value.hi);
+        return true;
+    }
+    return round_enclosed(n / d, out);
+}
+
+bool Wide::round_over_root(const Enclosed& n, const Enclosed& d, Rounding& out) {
+    return round_ratio(n, root(d), out);
+}
+
+bool Wide::round_root(const Enclosed& x, Rounding& out) { return round_enclosed(root(x), out); }
+
+bool Wide::round_place(Vec2 from, const Enclosed& n, const Enclosed& d, const Vector& way, Vec2& out) {
+    const Enclosed t = d.value.hi == 1.0 && d.value.lo == 0.0 && d.error == 0.0 ? n : n / d;
+    const auto at = [&t](double start, DoubleDouble length, double& end) {
+        return round_nearest(Enclosed(start) + t * Enclosed(length, 0.0), end);
+    };
+    return at(from.x, way.x, out.x) && at(from.y, way.y, out.y);
+}
+
+Vec2 Wide::direction(const Vector& v) {
+    const double size = std::max(std::fabs(v.x.hi), std::fabs(v.y.hi));
+    if (!(size > kSmallestSafe && size < kLargestSafe)) {
+        const int down = -std::ilogb(size);
+        const auto scaled = [down](DoubleDouble x) -> DoubleDouble {
+            return {std::scalbn(x.hi, down), std::scalbn(x.lo, down)};
+        };
+        return direction({scaled(v.x), scaled(v.y)});
+    }
+    const DoubleDouble length = sqrt(dot(v, v).value);
+    return {(v.x / length).hi, (v.y / length).hi};
+}
+
+bool Whole::round_ratio(const Exact& n, const Exact& d, Rounding& out) {
+    out = rounded_quotient(n, d);
+    return true;
+}
+
+bool Whole::round_over_root(const Exact& n, const Exact& d, Rounding& out) {
+    out = rounded_root(n * n, d);
+    if (n.sign() < 0) {
+        out = negated(out);
+    }
+    return true;
+}
+
+bool Whole::round_root(const Exact& x, Rounding& out) {
+    out = rounded_root(x, Exact(1.0));
+    return true;
+}
+
+bool Whole::round_place(Vec2 from, const Exact& n, const Exact& d, const Vector& way, Vec2& out) {
+    out = {rounded_quotient(Exact(from.x) * d + n * way.x, d).nearest,
+           rounded_quotient(Exact(from.y) * d + n * way.y, d).nearest};
+    return true;
+}
+
+Vec2 Whole::direction(const Vector& v) {
+    const Exact square = dot(v, v);
+    const auto part = [&square](const Exact& x) {
+        Rounding out;
+        round_over_root(x, square, out);
+        return out.nearest;
+    };
+    return {part(v.x), part(v.y)};
+}
+
+bool is_flat(const PolygonPair& pair) {
+    const PairedPolygon& a = pair.side(0);
+    const PairedPolygon& b = pair.side(1);
+    if (a.edges > 2 || b.edges > 2) {
+        return false;
+    }
+    return a.edges == 0 || b.edges == 0 || sign_of_cross(a.ring[0], a.ring[1], b.ring[0], b.ring[1]) == 0;
+}
+
+std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
+    const PairedPolygon& p = pair.side(axis.side);
+    const PairedPolygon& q = pair.other(axis.side);
+    const Vec2 start = p.ring[axis.index];
+    const Vec2 end = p.ring[p.next(axis.index)];
+    for (const std::size_t neighbour : {q.next(vertex), q.previous(vertex)}) {
+        if (neighbour != vertex && sign_of_cross(start, end, q.ring[vertex], q.ring[neighbour]) == 0) {
+            return neighbour;
+        }
+    }
+    return vertex;
+}
+
+bool is_before(Vec2 from_p, Vec2 to_p, Vec2 from_q, Vec2 to_q) {
+    // Rounding of a difference keeps its sign.
+    const auto is_down = [](Vec2 v) { return v.y < 0.0 || (v.y == 0.0 && v.x < 0.0); };
+    const bool down_p = is_down(to_p - from_p);
+    const bool down_q = is_down(to_q - from_q);
+    return down_p != down_q ? down_q : sign_of_cross(from_p, to_p, from_q, to_q) > 0;
+}
+
+}  // namespace geomsrv
