@@ -83,7 +83,7 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     _expect(boxes, Boxes, "boxes")
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
-    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    state, certain, counts, *_ = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
     return Cull(state, certain, cost, _record=certify_cull(frustum, boxes) if certified else None)

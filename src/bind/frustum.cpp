@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <optional>
 #include <string_view>
 #include <type_traits>
@@ -9,7 +10,7 @@
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
-#include "geom/exact_cull.hpp"
+#include "geom/cull_evidence.hpp"
 #include "geom/frustum_box.hpp"
 #include "geom/point_frustum.hpp"
 
@@ -179,6 +180,20 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const Frustum& frustum, BoxRows boxes, s
     return counts;
 }
 
+/// CullEvidence of every certain answer, (n, 4, 2) and (n, 2); -1 throughout for the others.
+void find_evidence(const Frustum& frustum, BoxRows boxes, std::size_t count, CullAnswers answers,
+                   std::int32_t* simplex, std::int8_t* beyond) {
+    constexpr std::size_t kAhead = 8;
+    CullWitness witness(frustum);
+    for (std::size_t i = 0; i < count; ++i) {
+        boxes.prefetch_axes(std::min(i + kAhead, count - 1));
+        CullEvidence found;
+        if (answers.certain[i]) found = witness.evidence(boxes[i], static_cast<CullState>(answers.state[i]));
+        std::memcpy(simplex + 8 * i, found.simplex, sizeof found.simplex);
+        std::memcpy(beyond + 2 * i, found.beyond, sizeof found.beyond);
+    }
+}
+
 // ---------------------------------------------------------------------------------------------- points
 
 template <int Sides>
@@ -306,10 +321,17 @@ void define_frustum(nb::module_& m) {
     m.def(
         "cull",
         [](const PackedFrustum& packed, const Rows3& center, const Matrices3& axes, const Rows3& half_extents,
-           const char* accuracy) {
+           const char* accuracy, bool evidence) {
             const std::size_t count = center.shape(0);
             auto state = empty<std::uint8_t>({count});
             auto certain = empty<bool>({count});
+            Output<std::int32_t> simplex{nb::none()};
+            Output<std::int8_t> beyond{nb::none()};
+            if (evidence) {
+                simplex = empty<std::int32_t>({count, 4, 2});
+                beyond = empty<std::int8_t>({count, 2});
+            }
+            const CullAnswers answers{state.data, certain.data};
             const std::string_view tier = accuracy;
             CullCounts counts;
             {
@@ -318,15 +340,18 @@ void define_frustum(nb::module_& m) {
                                        : tier == "float32" ? cull_all<FloatLanes, CullTier::float32>
                                        : tier == "float64" ? cull_all<Lanes, CullTier::float64>
                                                            : cull_all<Lanes, CullTier::exact>;
-                counts = cull_tier(unpack(packed.data()), {center.data(), axes.data(), half_extents.data()},
-                                   count, {state.data, certain.data});
+                const Frustum frustum = unpack(packed.data());
+                const BoxRows boxes{center.data(), axes.data(), half_extents.data()};
+                counts = cull_tier(frustum, boxes, count, answers);
+                if (evidence) find_evidence(frustum, boxes, count, answers, simplex.data, beyond.data);
             }
             return nb::make_tuple(
                 state.array, certain.array,
-                nb::make_tuple(counts.bound, counts.filter, counts.wide, counts.exact, counts.uncertain));
+                nb::make_tuple(counts.bound, counts.filter, counts.wide, counts.exact, counts.uncertain),
+                simplex.array, beyond.array);
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
-        nb::arg("half_extents").noconvert(), nb::arg("accuracy") = "float64");
+        nb::arg("half_extents").noconvert(), nb::arg("accuracy") = "float64", nb::arg("evidence") = false);
     m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>,
           nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
     m.def("distance_to_frustum_2d", distance_to_frustum_batch<1, PackedFrustum2D, Rows2>,

@@ -144,6 +144,17 @@ int CullSigns<N>::reaches_beyond(int plane) const {
     return sign_of(height(plane) + half_width(frustum_.normal[plane]));
 }
 
+template <class N>
+int CullSigns<N>::corner(int plane, int number) const {
+    const VectorOf<N>& normal = frustum_.normal[plane];
+    N sum = height(plane);
+    for (int i = 0; i < 3; ++i) {
+        const N arm = half_[i] * dot(normal, axis_[i]);
+        sum = (number >> i & 1) != 0 ? sum + arm : sum - arm;
+    }
+    return sign_of(sum);
+}
+
 template class CullSigns<Enclosed>;
 template class CullSigns<Exact>;
 

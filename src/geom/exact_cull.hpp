@@ -37,6 +37,8 @@ public:
     [[nodiscard]] int separates(int axis) const;
     /// Of the height of the highest corner over a plane.
     [[nodiscard]] int reaches_beyond(int plane) const;
+    /// Of the height of a corner, numbered by the bits of the axes added.
+    [[nodiscard]] int corner(int plane, int number) const;
 
 private:
     [[nodiscard]] N height(int plane) const {
@@ -61,8 +63,17 @@ public:
     /// REQUIRES: cull_by_axes left the box uncertain.
     Verdict decide(const OrientedBox& box);
 
-private:
+    /// What `ask` finds out from CullSigns, in the first arithmetic that can tell.
+    template <class Ask>
+    int sign(const OrientedBox& box, Ask ask) {
+        const int found = in_range(box) ? ask(CullSigns<Enclosed>(wide_, box)) : kUncertain;
+        return found != kUncertain ? found : ask(CullSigns<Exact>(exact_terms(), box));
+    }
+
+    /// Lengths are such that nothing overflows in double-double.
     [[nodiscard]] bool in_range(const OrientedBox& box) const;
+
+private:
     const FrustumTerms<Exact>& exact_terms();
 
     Frustum frustum_;
