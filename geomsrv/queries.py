@@ -28,7 +28,9 @@ __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersec
 FloatArray = NDArray[np.float64]
 Batch = Boxes | Polygons | Polytopes | Frustum
 
-TIERS = ("bound", "float32", "float64", "exact")  #: of queries that answer at all of them
+# What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
+RUNGS = ("bound", "filter", "wide", "exact")
+CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -213,7 +215,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES if isinstance(a, Polygons) else ("float64",))
     _validate.certificates(certificates)
     if isinstance(a, Polytopes):
         nothing = np.full(count, np.nan)
@@ -280,10 +282,10 @@ def distance(
     array([-0.5])
     """
     start = time.perf_counter_ns()
-    tier = _validate.accuracy(accuracy, TIERS if poses_ab is None and isinstance(a, Polygons) else ("float64",))
     effects = _validate.want(want, ("distance", "witness", "penetration"))
     if poses_ab is None and isinstance(a, Polygons):
-        return _polygon_distance(a, b, "penetration" in effects, tier, start)
+        return _polygon_distance(a, b, "penetration" in effects, accuracy, start)[0]
+    tier = _validate.accuracy(accuracy)
     if poses_ab is None:
         answer, message = _batch_distance(a, b, "penetration" in effects), ""
     else:
@@ -341,39 +343,36 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    if poses_ab is None and isinstance(a, Polygons):
+        answer, meet, certain = _polygon_distance(a, b, True, accuracy, time.perf_counter_ns())
+        return Booleans(meet, certain, answer.status, answer.cost)
     answer = distance(a, b, poses_ab, accuracy=accuracy, want=("penetration",))
     return Booleans(
         value=answer.distance <= 0.0,
-        certain=(answer.lower > 0.0) | (answer.upper <= 0.0),
+        certain=(answer.lower > 0.0) | (answer.upper < 0.0),
         status=answer.status,
         cost=answer.cost,
         message=answer.message,
     )
 
 
-def _polygon_distance(a: Polygons, b: Any, penetration: bool, tier: str, start: int) -> Distances:
-    """The engine's answer for polygons."""
+def _polygon_distance(
+    a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
+) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The engine's answer for polygons; whether they meet, and whether that is certain."""
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
-    gap, lower, upper, point_a, point_b, normal, status, rungs = _core.distance_polygons(
+    gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(
         a.vertices, a.offsets, b.vertices, b.offsets, penetration, tier
     )
-    return Distances(
-        distance=gap,
-        lower=lower,
-        upper=upper,
-        point_b=point_b,
-        status=status,
-        cost=Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs)),
-        _point_a=point_a,
-        _normal=normal,
-    )
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs))
+    return Distances(gap, lower, upper, point_b, status, cost, point_a, normal), meet, certain
 
 
-def _stages(tier: str, rungs: tuple[int, int, int]) -> dict[str, int]:
+def _stages(tier: str, rungs: tuple[int, ...]) -> dict[str, int]:
     """Items by what it took to answer them."""
-    names = ("bound" if tier == "bound" else "filter", "wide", "exact")
-    return dict(zip(names, rungs if tier == "exact" else rungs[:1], strict=False))
+    return {name: count for name, count in zip(RUNGS, rungs, strict=True) if name in CLIMB[tier]}
 
 
 def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:

@@ -1,7 +1,5 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/string_view.h>
-
 #include <array>
 #include <cstring>
 #include <string_view>
@@ -69,7 +67,7 @@ constexpr std::string_view fault_text(RingFault fault) {
 }
 
 /// How many items each rung answered.
-using RungCounts = std::array<std::int64_t, 3>;
+using RungCounts = std::array<std::int64_t, 4>;
 
 struct ContactRows {
     std::uint8_t* status;
@@ -130,6 +128,8 @@ struct DistanceRows {
     Vec2* point_b;
     Vec2* normal;
     std::uint8_t* status;
+    bool* meet;
+    bool* certain;
 };
 
 template <class Solver>
@@ -147,6 +147,8 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
         rows.point_b[i] = found.point_b;
         rows.normal[i] = found.normal;
         rows.status[i] = kOk;
+        rows.meet[i] = found.meet;
+        rows.certain[i] = found.certain;
         ++counts[static_cast<std::size_t>(found.rung)];
     }
 }
@@ -195,7 +197,7 @@ void define_polygons(nb::module_& m) {
         "first_contact_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
            const Offsets& offsets_b, const Rows2& velocity_a, const Rows2& velocity_b, double t_max,
-           bool contact_set, std::string_view accuracy) {
+           bool contact_set, const char* accuracy) {
             const MovingRings a(vertices_a, offsets_a, velocity_a);
             const MovingRings b(vertices_b, offsets_b, velocity_b);
             const std::size_t count = pair_count(a.rings, b.rings);
@@ -225,7 +227,7 @@ void define_polygons(nb::module_& m) {
             }
             return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
                                   last_time.array, normal.array, points.array, point_offsets.array,
-                                  certain.array, nb::make_tuple(counts[0], counts[1], counts[2]));
+                                  certain.array, nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
@@ -234,7 +236,7 @@ void define_polygons(nb::module_& m) {
     m.def(
         "distance_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
-           const Offsets& offsets_b, bool penetration, std::string_view accuracy) {
+           const Offsets& offsets_b, bool penetration, const char* accuracy) {
             const Rings a(vertices_a, offsets_a);
             const Rings b(vertices_b, offsets_b);
             const std::size_t count = pair_count(a, b);
@@ -245,13 +247,17 @@ void define_polygons(nb::module_& m) {
             const auto point_b = empty<double>({count, 2});
             const auto normal = empty<double>({count, 2});
             const auto status = empty<std::uint8_t>({count});
+            const auto meet = empty<bool>({count});
+            const auto certain = empty<bool>({count});
             const DistanceRows rows{distance.data,
                                     lower.data,
                                     upper.data,
                                     reinterpret_cast<Vec2*>(point_a.data),
                                     reinterpret_cast<Vec2*>(point_b.data),
                                     reinterpret_cast<Vec2*>(normal.data),
-                                    status.data};
+                                    status.data,
+                                    meet.data,
+                                    certain.data};
             RungCounts counts{};
             {
                 const nb::gil_scoped_release unlocked;
@@ -261,8 +267,8 @@ void define_polygons(nb::module_& m) {
                     });
             }
             return nb::make_tuple(distance.array, lower.array, upper.array, point_a.array, point_b.array,
-                                  normal.array, status.array,
-                                  nb::make_tuple(counts[0], counts[1], counts[2]));
+                                  normal.array, status.array, meet.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(), nb::arg("penetration"),
