@@ -16,6 +16,7 @@ namespace geomsrv {
 
 /// What had to be climbed to for an answer.
 enum class Rung : std::uint8_t {
+    bound,   ///< bounding volumes
     filter,  ///< float64 was proven right as it was
     wide,    ///< double-double with error bounds
     exact,

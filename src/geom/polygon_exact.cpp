@@ -133,25 +133,83 @@ bool is_flat(const PolygonPair& pair) {
     return a.edges == 0 || b.edges == 0 || sign_of_cross(a.ring[0], a.ring[1], b.ring[0], b.ring[1]) == 0;
 }
 
-std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
+AxisEnds ends_of(const PolygonPair& pair, AxisOf axis) {
     const PairedPolygon& p = pair.side(axis.side);
+    if (axis.index < p.edges) {
+        return {p.ring[axis.index], p.ring[p.next(axis.index)]};
+    }
+    const auto turned = [](Vec2 v) { return Vec2{-v.y, v.x}; };
+    if (p.edges != 2) {
+        return {{}, turned(p.axis(axis.index))};
+    }
+    const std::size_t tip = p.base(axis.index);
+    return {turned(p.ring[p.next(tip)]), turned(p.ring[tip])};
+}
+
+std::size_t lowest_along(const PolygonPair& pair, AxisOf axis) {
+    if (axis.index < pair.side(axis.side).edges) {
+        return pair.lowest(axis);
+    }
+    const Ring q = pair.other(axis.side).ring;
+    const AxisEnds ends = ends_of(pair, axis);
+    return q.size() > 1 && sign_of_cross(ends.from, ends.to, q[0], q[1]) > 0 ? 1 : 0;
+}
+
+int sign_of_gap(const PolygonPair& pair, AxisOf axis, std::size_t lowest) {
+    const PairedPolygon& p = pair.side(axis.side);
+    const AxisEnds ends = ends_of(pair, axis);
+    return -sign_of_cross(ends.from, ends.to, p.ring[p.base(axis.index)], pair.other(axis.side).ring[lowest]);
+}
+
+std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
     const PairedPolygon& q = pair.other(axis.side);
-    const Vec2 start = p.ring[axis.index];
-    const Vec2 end = p.ring[p.next(axis.index)];
+    const AxisEnds edge = ends_of(pair, axis);
     for (const std::size_t neighbour : {q.next(vertex), q.previous(vertex)}) {
-        if (neighbour != vertex && sign_of_cross(start, end, q.ring[vertex], q.ring[neighbour]) == 0) {
+        if (neighbour != vertex && sign_of_cross(edge.from, edge.to, q.ring[vertex], q.ring[neighbour]) == 0) {
             return neighbour;
         }
     }
     return vertex;
 }
 
-bool is_before(Vec2 from_p, Vec2 to_p, Vec2 from_q, Vec2 to_q) {
+Relation relation_of(const PolygonPair& pair, bool flat, std::size_t most, std::vector<AxisOf>& touching) {
+    touching.clear();
+    for (const int side : {0, 1}) {
+        const PairedPolygon& p = pair.side(side);
+        for (std::size_t k = 0; k < axes_of(p, flat); ++k) {
+            if (p.work[most][k] < 0.0) {
+                continue;
+            }
+            const AxisOf axis{side, k};
+            const int sign = sign_of_gap(pair, axis, lowest_along(pair, axis));
+            if (sign > 0) {
+                return Relation::apart;
+            }
+            if (sign == 0) {
+                touching.push_back(axis);
+            }
+        }
+    }
+    return touching.empty() ? Relation::overlapping : Relation::touching;
+}
+
+bool is_before(const AxisEnds& p, const AxisEnds& q) {
     // Rounding of a difference keeps its sign.
-    const auto is_down = [](Vec2 v) { return v.y < 0.0 || (v.y == 0.0 && v.x < 0.0); };
-    const bool down_p = is_down(to_p - from_p);
-    const bool down_q = is_down(to_q - from_q);
-    return down_p != down_q ? down_q : sign_of_cross(from_p, to_p, from_q, to_q) > 0;
+    const auto is_down = [](const AxisEnds& ends) {
+        const Vec2 v = ends.to - ends.from;
+        return v.y < 0.0 || (v.y == 0.0 && v.x < 0.0);
+    };
+    const bool down_p = is_down(p);
+    const bool down_q = is_down(q);
+    return down_p != down_q ? down_q : sign_of_cross(p.from, p.to, q.from, q.to) > 0;
+}
+
+bool is_before(const PolygonPair& pair, AxisOf p, AxisOf q) {
+    const auto ends = [&pair](AxisOf axis) {
+        const AxisEnds out = ends_of(pair, axis);
+        return axis.side == 0 ? out : AxisEnds{out.to, out.from};
+    };
+    return is_before(ends(p), ends(q));
 }
 
 }  // namespace geomsrv

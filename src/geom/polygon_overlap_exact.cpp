@@ -124,7 +124,8 @@ std::span<const Vec2> ExactPolygonOverlap::of(const PolygonPair& pair, bool in_r
         std::sort(corners_.begin(), corners_.end(), [&pair](const Corner& c, const Corner& d) {
             const PairedPolygon& p = pair.side(c.side);
             const PairedPolygon& q = pair.side(d.side);
-            return is_before(p.ring[c.edge], p.ring[p.next(c.edge)], q.ring[d.edge], q.ring[q.next(d.edge)]);
+            return is_before({p.ring[c.edge], p.ring[p.next(c.edge)]},
+                             {q.ring[d.edge], q.ring[q.next(d.edge)]});
         });
     } else {
         std::sort(corners_.begin(), corners_.end(), [](const Corner& c, const Corner& d) {

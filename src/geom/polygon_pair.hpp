@@ -117,9 +117,13 @@ struct Slack {
     double limit = 0.0;
 };
 
-/// Unit vector, whatever the length of v; v is not zero.
+/// Unit vector, whatever the length of v; zero for zero, which an edge may be that is far smaller than the
+/// pair.
 inline Vec2 unit(Vec2 v) {
     const double largest = std::max(std::fabs(v.x), std::fabs(v.y));
+    if (largest == 0.0) {
+        return {};
+    }
     const Vec2 reduced{v.x / largest, v.y / largest};
     return (1.0 / norm(reduced)) * reduced;
 }
