@@ -111,7 +111,7 @@ class Certificates:
     >>> import geomsrv as gs
     >>> square = gs.Polygons.from_list([[(0, 0), (1, 0), (1, 1), (0, 1)]])
     >>> other = gs.Polygons.from_list([[(3, 0), (4, 0), (4, 1), (3, 1)]])
-    >>> answer = gs.first_contact(square, other, (1, 0), (0, 0), certificates=True)
+    >>> answer = gs.first_contact(square, other, (1, 0), (0, 0), accuracy="exact", certificates=True)
     >>> answer.certificates[0]["claim"]["status"]
     'WILL_TOUCH'
     >>> gs.verify(answer)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geomsrv import _validate
 from geomsrv.answers import Booleans, ContactStatus, Cull, CullState, Distances, DistanceStatus, FirstContacts, Record
-from geomsrv.evidence import evidence_of_contact, evidence_of_cull, evidence_of_distance
+from geomsrv.evidence import evidence_of_contact, evidence_of_distance
 from geomsrv.shapes import (
     Box,
     Boxes,
@@ -39,17 +39,22 @@ Pairs = NDArray[np.int32]
 Prover = Callable[[Any, int], Record]
 
 
-def certify_cull(frustum: Frustum, boxes: Boxes, simplex: Pairs | None = None) -> Prover:
-    """Records of a `Cull`.
-
-    `simplex`, here and below: (n, k, 2) pairs of vertices where the engine ended, unused rows -1; None if unknown.
-    """
+def certify_cull(frustum: Frustum, boxes: Boxes, simplex: Any, beyond: Any) -> Prover:
+    """Records of a `Cull`; the evidence is that of cull_evidence.hpp, (n, 4, 2) and (n, 2)."""
 
     def record(answer: Cull, i: int) -> Record:
-        a, b, state = _item(frustum, i), _item(boxes, i), CullState(int(answer.state[i])).name
+        sides, state = (_item(frustum, i), _item(boxes, i)), CullState(int(answer.state[i]))
         if not answer.certain[i]:
-            return _record("cull", a, b, {}, {})
-        return _record("cull", a, b, {"state": state}, evidence_of_cull(a, b, state, _listed(simplex, i)))
+            return _record("cull", *sides, {}, {})
+        evidence: Record = {}
+        pairs, (corner, plane) = _listed(simplex, i), beyond[i].tolist()
+        if plane >= 0:
+            evidence["beyond"] = [max(corner, 0), plane]
+        if pairs:
+            evidence["simplex"] = pairs
+        elif state == CullState.INTERSECTS:
+            evidence["inside"] = [k for _, k in simplex[i].tolist() if k >= 0]
+        return _record("cull", *sides, {"state": state.name}, evidence)
 
     return record
 
@@ -59,6 +64,7 @@ def certify_distances(
 ) -> Prover:
     """Records of `Distances` or `Booleans` of batches, of a frustum and points, or of shapes at poses.
 
+    `simplex`: (n, k, 2) pairs of vertices where the engine ended, unused rows -1; None if it tells none.
     `signed`: negative distances are penetration depths.
     """
 

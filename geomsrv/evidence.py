@@ -18,7 +18,6 @@ from geomsrv.verify import (
     Vector,
     axis_of,
     dot,
-    face_of,
     in_units,
     nearest,
     normals_to,
@@ -27,7 +26,7 @@ from geomsrv.verify import (
     unit_of,
 )
 
-__all__ = ["evidence_of_contact", "evidence_of_cull", "evidence_of_distance"]
+__all__ = ["evidence_of_contact", "evidence_of_distance"]
 
 Record = dict[str, Any]
 Pairs = list[list[int]]
@@ -42,20 +41,6 @@ def evidence_of_distance(a: Record, b: Record, start: Pairs, normal: list[float]
     if normal is not None and not any(nearest(pair.differences(evidence["simplex"]))[0]):
         evidence["directions"] = [normal]
         evidence["facet"] = _facet(pair, in_units(normal, unit_of(normal)))
-    return evidence
-
-
-def evidence_of_cull(a: Record, b: Record, state: str, start: Pairs) -> Record:
-    """Of the state of a box."""
-    if state == "INSIDE":
-        return {}
-    pair = Pair(a, b)
-    evidence: Record = {"simplex": _simplex(pair.a, pair.b, start)}
-    if state == "INTERSECTS":
-        faces = [face_of(pair.a, plane) for plane in range(6)]
-        places = product(enumerate(pair.b), enumerate(faces))
-        beyond = ([corner, plane] for (corner, v), (plane, (n, d)) in places if dot(n, v) > d)
-        evidence["beyond"] = next(beyond, [0, 0])
     return evidence
 
 

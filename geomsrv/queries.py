@@ -23,7 +23,18 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
-from geomsrv.shapes import Boxes, Frustum, Frustum2D, Polygons, Polytopes, Shape, pack
+from geomsrv.shapes import (
+    Boxes,
+    Capsule,
+    Frustum,
+    Frustum2D,
+    HalfSpace,
+    Polygons,
+    Polytopes,
+    Shape,
+    Sphere,
+    pack,
+)
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -41,6 +52,7 @@ CULL_COUNTS = {
 # What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
+SOLID_TIERS = ("float64", "exact")
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -86,10 +98,11 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     _expect(boxes, Boxes, "boxes")
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
-    state, certain, counts, *_ = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
+    state, certain, counts, *evidence = _core.cull(*given, tier, certified)
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
-    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes) if certified else None)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, *evidence) if certified else None)
 
 
 def distance_to_frustum(
@@ -306,23 +319,29 @@ def distance(
         found = _polygon_distance(a, b, signed, accuracy, start)[0]
         proven = _validate.certificates(certificates, found.cost.accuracy)
         return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, SOLID_TIERS)
     certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
-        answer, message = _batch_distance(a, b, signed), ""
+        answer, message = _batch_distance(a, b, signed, tier, certified), ""
     else:
         shapes: list[Any] = [a, b]
         for shape, name in zip(shapes, "ab", strict=True):
             _expect(shape, (Shape, Frustum), name)
         poses = _validate.poses(poses_ab, "poses_ab")
         pairs = np.broadcast_to(np.array([0, 1]), (len(poses), 2))
-        answer = _core.distance_pairs(*pack(shapes), np.ascontiguousarray(pairs), poses, signed)
+        frusta = np.array([x.packed() if isinstance(x, Frustum) else np.zeros(18) for x in shapes])
+        answer = _core.distance_pairs(
+            *pack(shapes), np.ascontiguousarray(pairs), poses, signed, tier, evidence=certified, frusta=frusta
+        )
         unsupported = (answer[6] == DistanceStatus.UNSUPPORTED).any()
         kinds = "-".join(shape.kind for shape in shapes)
         message = f"distance {kinds} is unsupported in this version" if unsupported else ""
-    gap, lower, upper, point_a, point_b, normal, status = answer
+    gap, lower, upper, point_a, point_b, normal, status, *rung = answer[:8]
     totals = np.bincount(status, minlength=len(DistanceStatus))
     counts = {outcome.name.lower(): int(totals[outcome]) for outcome in DistanceStatus if totals[outcome]}
+    if tier != "float64":
+        rungs = np.bincount(rung[0][status != DistanceStatus.UNSUPPORTED], minlength=len(RUNGS))
+        counts |= {name: int(total) for name, total in zip(RUNGS, rungs, strict=True) if total}
     return Distances(
         distance=gap,
         lower=lower,
@@ -333,7 +352,7 @@ def distance(
         _point_a=point_a,
         _normal=normal,
         message=message,
-        _record=certify_distances(a, b, poses_ab=poses, signed=signed) if certified else None,
+        _record=certify_distances(a, b, answer[8], poses_ab=poses, signed=signed) if certified else None,
     )
 
 
@@ -378,10 +397,16 @@ def intersects(
         proven = _validate.certificates(certificates, answer.cost.accuracy)
         record = certify_distances(a, b, signed=True) if proven else None
         return Booleans(meet, certain, answer.status, answer.cost, _record=record)
-    answer = distance(a, b, poses_ab, accuracy=accuracy, want=("penetration",), certificates=certificates)
+    # Without depth exact arithmetic tells touching from overlapping, too; float64 needs the margin.
+    want = () if accuracy == "exact" else ("penetration",)
+    answer = distance(a, b, poses_ab, accuracy=accuracy, want=want, certificates=certificates)
+    value, certain = answer.distance <= 0.0, (answer.lower > 0.0) | (answer.upper <= 0.0)
+    if accuracy == "exact" and not any(isinstance(body, (Sphere, Capsule, HalfSpace)) for body in (a, b)):
+        # Correctly rounded: the upper neighbour of a distance, however short, is no zero.
+        value, certain = answer.upper <= 0.0, answer.status == DistanceStatus.OK
     return Booleans(
-        value=answer.distance <= 0.0,
-        certain=(answer.lower > 0.0) | (answer.upper <= 0.0),
+        value=value,
+        certain=certain,
         status=answer.status,
         cost=answer.cost,
         message=answer.message,
@@ -408,28 +433,22 @@ def _stages(tier: str, rungs: tuple[int, ...]) -> dict[str, int]:
     return {name: count for name, count in zip(RUNGS, rungs, strict=True) if name in CLIMB[tier]}
 
 
-def _batch_distance(a: Any, b: Any, penetration: bool) -> tuple[Any, ...]:
+def _batch_distance(a: Any, b: Any, penetration: bool, tier: str, evidence: bool) -> tuple[Any, ...]:
     """The engine's answer for two batches in world coordinates."""
     _expect(a, (Boxes, Polygons, Polytopes, Frustum), "a")
     _expect(b, (Boxes, Polytopes, Frustum), "b")
     _common_length(_length(a), _length(b))
-    if isinstance(a, Boxes) and isinstance(b, Boxes):
-        return _core.distance_boxes(a.center, a.axes, a.half_extents, b.center, b.axes, b.half_extents, penetration)
-    if isinstance(a, Boxes):
-        return _core.distance_boxes_polytopes(a.center, a.axes, a.half_extents, *_hulls(b), penetration)
-    if isinstance(b, Boxes):
-        answer = _core.distance_boxes_polytopes(b.center, b.axes, b.half_extents, *_hulls(a), penetration)
-        gap, lower, upper, point_b, point_a, normal, status = answer
-        return gap, lower, upper, point_a, point_b, -normal, status
-    return _core.distance_polytopes(*_hulls(a), *_hulls(b), penetration)
+    return _core.distance_world(_side(a), _side(b), penetration, tier, evidence)
 
 
-def _hulls(side: Polytopes | Frustum) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
-    """Vertices, offsets, what the vertices are relative to, and how far each may be from the one meant."""
-    if isinstance(side, Frustum):
-        corners = side.corners(side.origin)
-        return corners, np.array([0, len(corners)]), side.origin[None], np.array([side.corner_error(side.origin)])
-    return side.vertices, side.offsets, np.zeros((len(side), 3)), np.zeros(len(side))
+def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:
+    """A batch as the engine reads it."""
+    if isinstance(batch, Boxes):
+        return batch.center, batch.axes, batch.half_extents
+    if isinstance(batch, Polytopes):
+        return batch.vertices, batch.offsets
+    corners, error = batch.corners(batch.origin), batch.corner_error(batch.origin)
+    return batch.packed(), corners, np.array([error])
 
 
 def _length(side: Batch) -> int:

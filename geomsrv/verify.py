@@ -252,7 +252,7 @@ _SIDES = ((2, 0), (2, 1), (0, 1), (0, 0), (1, 1), (1, 0))
 _FACES = [[i for i in range(8) if i >> bit & 1 == side] for bit, side in _SIDES]
 
 
-def face_of(corners: Sequence[Vector], plane: int) -> tuple[list[int], int]:
+def _face(corners: Sequence[Vector], plane: int) -> tuple[list[int], int]:
     """The half space n . x <= d that a face of a frustum bounds: n and d."""
     p, q, r = (corners[i] for i in _FACES[plane][:3])
     n = cross(sum_of(q, -1, p), sum_of(r, -1, p))
@@ -264,21 +264,30 @@ def face_of(corners: Sequence[Vector], plane: int) -> tuple[list[int], int]:
 
 def _cull(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fields) -> None:
     """Box b is OUTSIDE frustum a, INSIDE, or INTERSECTS it: has points in it and others beyond it."""
-    state = claim["state"]
-    _require(a["kind"] == "frustum" and len(pair.a) == 8, "a is not a frustum")
+    state, (corner, plane) = claim["state"], evidence.get("beyond", (0, 0))
+    _require(a["kind"] == "frustum" and len(pair.a) == 8 == len(pair.b), "not a frustum and a box")
+    _require(0 <= corner < 8 and 0 <= plane < 6, "beyond: no such corner or plane")
+    v = nearest(pair.differences(evidence["simplex"]))[0] if "simplex" in evidence else None
+
+    def within(point: Vector, times: int = 1) -> bool:
+        return all(dot(n, point) <= times * d for n, d in (_face(pair.a, k) for k in range(6)))
+
+    def beyond(points: Iterable[Vector]) -> bool:
+        n, d = _face(pair.a, plane)
+        return all(dot(n, point) > d for point in points)
+
     if state == "INSIDE":
-        faces = [face_of(pair.a, plane) for plane in range(6)]
-        _require(all(dot(n, v) <= d for n, d in faces for v in pair.b), "INSIDE: a vertex is beyond a face")
+        _require(all(map(within, pair.b)), "INSIDE: a corner is beyond a plane")
+    elif state == "OUTSIDE":
+        _require(pair.gap(v) > 0 if v else beyond(pair.b), "OUTSIDE: not apart along the direction")
     else:
-        v, _, _ = nearest(pair.differences(evidence["simplex"]))
-        if state == "OUTSIDE":
-            _require(pair.gap(v) > 0, "OUTSIDE: the direction does not separate")
+        _require(state == "INTERSECTS" and beyond([pair.b[corner]]), f"{state}: the corner is not beyond the plane")
+        if v is None:  # a corner of the box, or without one its centre
+            inside = evidence["inside"]
+            common = within(pair.b[inside[0]]) if inside else within(sum_of(pair.b[0], 1, pair.b[7]), 2)
         else:
-            _require(state == "INTERSECTS" and not any(v), f"{state}: no common point")
-            corner, plane = evidence["beyond"]
-            _require(0 <= corner < len(pair.b) and 0 <= plane < 6, "beyond: no such corner or plane")
-            n, d = face_of(pair.a, plane)
-            _require(dot(n, pair.b[corner]) > d, "INTERSECTS: the corner is not beyond the face")
+            common = not any(v)
+        _require(common, "INTERSECTS: no common point")
 
 
 def across(p: Vector, q: Vector) -> list[int]:

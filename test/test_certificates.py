@@ -474,7 +474,7 @@ def test_change_in_a_record_is_rejected_or_still_true(name) -> None:
                 assert is_true(other), f"{change}\n{reproducer(**record)}"
             else:
                 rejected += 1
-    assert rejected > 50
+    assert rejected > 20
 
 
 def test_certificates_have_to_be_asked_for() -> None:

@@ -11,16 +11,9 @@
 #include "geom/double_double.hpp"
 #include "geom/exact_number.hpp"
 #include "geom/rounding.hpp"
+#include "geom/rung.hpp"
 
 namespace geomsrv {
-
-/// What had to be climbed to for an answer.
-enum class Rung : std::uint8_t {
-    bound,   ///< bounding volumes
-    filter,  ///< float64 was proven right as it was
-    wide,    ///< double-double with error bounds
-    exact,
-};
 
 /// A number and how far the exact one may be from it.
 struct Enclosed {
@@ -43,8 +36,9 @@ inline constexpr double kNoUnderflow = 0x1p-960;
 /// Known to be zero.
 inline bool is_zero(const Enclosed& x) { return x.value.hi == 0.0 && x.error == 0.0; }
 
-// A product of two doubles has 106 bits: if it is larger than this, all of them are above 2^-1022.
+// The same with room to spare, for products of more than two.
 inline constexpr double kWholeProduct = 0x1p-900;
+inline constexpr double kSurelyNormal = kWholeProduct;
 
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
@@ -75,6 +69,14 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
                 (whole ? 0.0 : kEnclosedUnderflow)};
 }
+
+/// 2 a, which rounds nothing.
+inline Enclosed twice(const Enclosed& a) { return {{2.0 * a.value.hi, 2.0 * a.value.lo}, 2.0 * a.error}; }
+inline Exact twice(const Exact& a) { return a + a; }
+
+/// |a|, off by no more than a.
+inline Enclosed magnitude(const Enclosed& a) { return a.value.hi < 0.0 ? -a : a; }
+inline Exact magnitude(const Exact& a) { return a.magnitude(); }
 
 /// What `sign_of` answers where the error does not let it decide.
 inline constexpr int kUncertain = 2;

@@ -12,9 +12,6 @@ namespace {
 // Products of lengths have at most three factors, so nothing overflows in double-double up to here.
 constexpr double kMostWide = 0x1p300;
 
-Enclosed magnitude(const Enclosed& x) { return x.value.hi < 0.0 ? -x : x; }
-Exact magnitude(const Exact& x) { return x.magnitude(); }
-
 /// Neither is known to be the larger one; but the maximum of two numbers is no further from that of their
 /// estimates than either from its own.
 Enclosed maximum(const Enclosed& a, const Enclosed& b) {
