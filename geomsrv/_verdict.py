@@ -8,7 +8,7 @@ Pure functions over one case at a time; nothing here computes geometry.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from fractions import Fraction
@@ -170,16 +170,14 @@ def _first_contact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]
 
 
 def _contact_set(points: Any, motion: Motion, scale: Fraction) -> Finding:
-    """Whether the corners are those of the exact set, to the rounding of the coordinates."""
+    """Whether the corners are those of the exact set, but for the rounding of coordinates."""
     told = [tuple(map(Fraction, point)) for point in points.tolist()]
-    slack = DECIDABLE * scale
+    slack = DECIDABLE * scale + Fraction(math.ulp(np.abs(points).max(initial=0.0)))
 
-    def near(p: tuple[Fraction, ...], q: tuple[Fraction, ...]) -> bool:
-        return all(abs(x - y) <= slack for x, y in zip(p, q, strict=True))
+    def one_of(p: tuple[Fraction, ...], others: Iterable[tuple[Fraction, ...]]) -> bool:
+        return any(all(abs(x - y) <= slack for x, y in zip(p, q, strict=True)) for q in others)
 
-    right = all(any(near(p, q) for q in told) for p in motion.contact) and all(
-        any(near(p, q) for q in motion.contact) for p in told
-    )
+    right = all(one_of(p, told) for p in motion.contact) and all(one_of(p, motion.contact) for p in told)
     return _boolean(right, True, False, f"contact set {points.tolist()}")
 
 

@@ -106,7 +106,7 @@ class Report:
             padded = [c.ljust(w) if k < 2 else c.rjust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True))]
             shown.append("  ".join(padded).rstrip())
             last = first
-        notes = [f"{engine}: not asked, {why}" for engine, why in self.missing.items()]
+        notes = [f"{engine}: not asked: {why}" for engine, why in self.missing.items()]
         if self.undecided:
             notes.append(f"{self.undecided} cases without an answer that anyone could give were left out")
         return "\n".join([*shown, *notes])
@@ -185,6 +185,9 @@ def _ask_peer(name: str, known: list[tuple[str, Case, Truth]], report: Report, t
     if fcl.reason:
         report.missing[name] = fcl.reason
         return
+    resting = int((replies["outcome"] == NoReply.BACKING_OFF).sum())
+    if resting:
+        report.missing[name] = f"about {resting} cases, because it had died too often"
     for (row, case, truth, overstates), outcome, gap in zip(rows, replies["outcome"], replies["distance"], strict=True):
         if outcome == NoReply.BACKING_OFF:
             continue
