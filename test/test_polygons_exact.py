@@ -500,3 +500,24 @@ def test_one_against_many(scenes):
     nothing = gs.Polygons(np.zeros((0, 2)), [0])
     assert gs.first_contact(nothing, nothing, (0, 0), (0, 0), accuracy="exact").point_offsets.tolist() == [0]
     assert len(gs.distance(nothing, nothing, accuracy="exact").distance) == 0
+
+
+# -------------------------------------------------------------------------------------------- the other tiers
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_what_is_certain_at_float64_is_so(rng, kind):
+    reached = Counter()
+    for t_max in (INF, 2.0):
+        scenes = [(*SCENES[kind](rng), t_max) for _ in range(250)]
+        for scale in ((0, 0), (-900, -600), (0, -950)):
+            batch = [scaled(scene[:4], *scale, t_max) for scene in scenes]
+            truth, answer = contacts(batch), contacts(batch, "float64")
+            sure = answer.certain
+            wrong = np.flatnonzero(sure & (answer.status != truth.status))
+            assert len(wrong) == 0, reproducer(scene=batch[wrong[0]])
+            reached.update(answer.status[sure].tolist())
+            reached["certain"] += sure.sum()
+            reached["all"] += len(batch)
+    assert min(reached[k] for k in (gs.NEVER, gs.WILL_TOUCH, gs.OVERLAPPING)) >= 20, reached
+    assert reached["certain"] >= 0.4 * reached["all"], reached

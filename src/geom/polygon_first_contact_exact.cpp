@@ -200,7 +200,8 @@ int is_preferred(const PolygonPair& pair, const Clip<A>& p, const Clip<A>& q) {
     }
     int order = sign_p - sign_q;
     if (order == 0 && sign_p != 0) {
-        order = sign_of(p.rate * p.rate * dot(q.normal, q.normal) - q.rate * q.rate * dot(p.normal, p.normal));
+        order =
+            sign_of(p.rate * p.rate * dot(q.normal, q.normal) - q.rate * q.rate * dot(p.normal, p.normal));
         if (order == kUncertain) {
             return kUncertain;
         }
