@@ -51,7 +51,7 @@ OPTIONAL = {
 
 # The C++ includes: its own directories by their path from src, the standard library by names without a dot.
 CPP_LAYERS = {
-    "src/bind/*": ("bind/*", "geom/*", "nanobind/*"),
+    "src/bind/*": ("bind/*", "geom/*", "nanobind/*", "sys/mman.h"),
     "src/geom/*": ("geom/*", "boost/multiprecision/cpp_int.hpp"),
 }
 VECTOR_INTRINSICS = ("immintrin.h",)
