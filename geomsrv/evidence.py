@@ -50,33 +50,33 @@ def evidence_of_contact(a: Record, b: Record, status: str, t_max: float) -> Reco
     speed = relative_velocity(a, b, pair.unit)
     if status == "OVERLAPPING":
         return {"around": _around(pair)}
-    evidence: Record = {}
-    for facets in (_edges(pair), _chords(pair)):
-        latest = Fraction(0)
-        for facet in facets:
-            clips = clips_of(pair, speed, {"facet": facet})
+    latest, named = Fraction(0), Record()
+    for ways in (_edges(pair), _chords(pair)):
+        for way in ways:
+            clips = clips_of(pair, speed, way)
             if status == "NEVER" and any(gap > 0 and (time is None or time > t_max) for gap, time in clips):
-                return {"facet": facet}
+                return way
             time = max((time for _, time in clips if time is not None), default=latest)
             if time > latest if status == "WILL_TOUCH" else any(gap == 0 for gap, _ in clips):
-                latest, evidence["facet"] = time, facet
+                latest, named = time, way
         moved = pair.moved(speed, latest if status == "WILL_TOUCH" else Fraction(0))
-        evidence["simplex"] = _simplex(moved.a, moved.b, [])
-        if not any(nearest(moved.differences(evidence["simplex"]))[0]):
+        simplex = _simplex(moved.a, moved.b, [])
+        if not any(nearest(moved.differences(simplex))[0]):
             break
-    return evidence
+    return named | {"simplex": simplex}
 
 
-def _edges(pair: Pair) -> Iterator[Pairs]:
-    """Edges of both rings, as those of b - a; of points, a point."""
-    yield from ([[i, 0], [(i + 1) % len(pair.a), 0]] for i in range(len(pair.a)))
-    yield from ([[0, j], [0, (j + 1) % len(pair.b)]] for j in range(len(pair.b)))
+def _edges(pair: Pair) -> Iterator[Record]:
+    """No facet, then those of both rings; of points, a point."""
+    yield {}
+    yield from ({"facet": [[i, 0], [(i + 1) % len(pair.a), 0]]} for i in range(len(pair.a)))
+    yield from ({"facet": [[0, j], [0, (j + 1) % len(pair.b)]]} for j in range(len(pair.b)))
 
 
-def _chords(pair: Pair) -> Iterator[Pairs]:
+def _chords(pair: Pair) -> Iterator[Record]:
     """Between any two vertices: rings may be dented by rounding, and then an edge of the hull is none of the ring."""
-    yield from ([[i, 0], [k, 0]] for i, k in combinations(range(len(pair.a)), 2))
-    yield from ([[0, j], [0, k]] for j, k in combinations(range(len(pair.b)), 2))
+    yield from ({"facet": [[i, 0], [k, 0]]} for i, k in combinations(range(len(pair.a)), 2))
+    yield from ({"facet": [[0, j], [0, k]]} for j, k in combinations(range(len(pair.b)), 2))
 
 
 def _around(pair: Pair) -> Pairs:
