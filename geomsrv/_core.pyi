@@ -15,8 +15,8 @@ _Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
 _ProvenDistances = tuple[_F, _F, _F, _F, _F, _F, _U, _U, NDArray[np.int32] | None]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
-# items answered by the filter (or bounding volumes), in double-double, exactly
-_Rungs = tuple[int, int, int]
+# items answered by bounding volumes, by the filter, in double-double, exactly
+_Rungs = tuple[int, int, int, int]
 
 def first_nonfinite(values: _F) -> int: ...
 def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
@@ -41,7 +41,7 @@ def first_contact_polygons(
 ) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _Rungs]: ...
 def distance_polygons(
     vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool, accuracy: str = "float64"
-) -> tuple[_F, _F, _F, _F, _F, _F, _U, _Rungs]: ...
+) -> tuple[_F, _F, _F, _F, _F, _F, _U, _B, _B, _Rungs]: ...
 def distance_world(
     a: tuple[_F | _I, ...], b: tuple[_F | _I, ...], penetration: bool, accuracy: str = "float64", evidence: bool = False
 ) -> _ProvenDistances: ...

@@ -224,7 +224,7 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
 def polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
     """Distances of polygons, in any order."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
-    gap, lower, upper, point_a, point_b, normal, status, _ = _core.distance_polygons(*rings, penetration)
+    gap, lower, upper, point_a, point_b, normal, status, *_ = _core.distance_polygons(*rings, penetration)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     lower, upper = _widened(lower, upper, uncertainty, penetration)
     return DistanceRows(

@@ -49,8 +49,10 @@ CULL_COUNTS = {
     "float64": ("bound", "filter", "uncertain"),
     "exact": ("bound", "filter", "wide", "exact"),
 }
+# What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
+RUNGS = ("bound", "filter", "wide", "exact")
+CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 SOLID_TIERS = ("float64", "exact")
-RUNGS = ("bound", "filter", "wide", "exact")  # how high an answer had to climb, as the engine numbers it
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -94,7 +96,7 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
-    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
+    tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
     state, certain, counts, *evidence = _core.cull(*given, tier, certified)
@@ -311,14 +313,14 @@ def distance(
     array([-0.5])
     """
     start = time.perf_counter_ns()
-    solid = not (poses_ab is None and isinstance(a, Polygons))
-    tier = _validate.accuracy(accuracy, SOLID_TIERS if solid else TIERS)
-    certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness", "penetration"))
     signed, poses = "penetration" in effects, None
-    if not solid:
-        found = _polygon_distance(a, b, signed, tier, start)
-        return replace(found, _record=certify_distances(a, b, signed=signed)) if certified else found
+    if poses_ab is None and isinstance(a, Polygons):
+        found = _polygon_distance(a, b, signed, accuracy, start)[0]
+        proven = _validate.certificates(certificates, found.cost.accuracy)
+        return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
+    tier = _validate.accuracy(accuracy, SOLID_TIERS)
+    certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
         answer, message = _batch_distance(a, b, signed, tier, certified), ""
     else:
@@ -390,6 +392,11 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    if poses_ab is None and isinstance(a, Polygons):
+        answer, meet, certain = _polygon_distance(a, b, True, accuracy, time.perf_counter_ns())
+        proven = _validate.certificates(certificates, answer.cost.accuracy)
+        record = certify_distances(a, b, signed=True) if proven else None
+        return Booleans(meet, certain, answer.status, answer.cost, _record=record)
     # Without depth exact arithmetic tells touching from overlapping, too; float64 needs the margin.
     want = () if accuracy == "exact" else ("penetration",)
     answer = distance(a, b, poses_ab, accuracy=accuracy, want=want, certificates=certificates)
@@ -407,29 +414,23 @@ def intersects(
     )
 
 
-def _polygon_distance(a: Any, b: Any, penetration: bool, tier: str, start: int) -> Distances:
-    """The engine's answer for polygons."""
+def _polygon_distance(
+    a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
+) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The engine's answer for polygons; whether they meet, and whether that is certain."""
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
-    gap, lower, upper, point_a, point_b, normal, status, rungs = _core.distance_polygons(
+    gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(
         a.vertices, a.offsets, b.vertices, b.offsets, penetration, tier
     )
-    return Distances(
-        distance=gap,
-        lower=lower,
-        upper=upper,
-        point_b=point_b,
-        status=status,
-        cost=Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs)),
-        _point_a=point_a,
-        _normal=normal,
-    )
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs))
+    return Distances(gap, lower, upper, point_b, status, cost, point_a, normal), meet, certain
 
 
-def _stages(tier: str, rungs: tuple[int, int, int]) -> dict[str, int]:
+def _stages(tier: str, rungs: tuple[int, ...]) -> dict[str, int]:
     """Items by what it took to answer them."""
-    names = ("bound" if tier == "bound" else "filter", "wide", "exact")
-    return dict(zip(names, rungs if tier == "exact" else rungs[:1], strict=False))
+    return {name: count for name, count in zip(RUNGS, rungs, strict=True) if name in CLIMB[tier]}
 
 
 def _batch_distance(a: Any, b: Any, penetration: bool, tier: str, evidence: bool) -> tuple[Any, ...]:

@@ -45,13 +45,13 @@ PYTHON_LAYERS = {
 
 # Optional peers, imported on use.  "*" marks a file that may choose the module's name at run time.
 OPTIONAL = {
-    "geomsrv/fcl_worker.py": ("fcl",),
+    "geomsrv/fcl_worker.py": ("coal", "fcl"),
     "geomsrv/robot.py": ("*",),
 }
 
 # The C++ includes: its own directories by their path from src, the standard library by names without a dot.
 CPP_LAYERS = {
-    "src/bind/*": ("bind/*", "geom/*", "nanobind/*"),
+    "src/bind/*": ("bind/*", "geom/*", "nanobind/*", "sys/mman.h"),
     "src/geom/*": ("geom/*", "boost/multiprecision/cpp_int.hpp"),
 }
 VECTOR_INTRINSICS = ("immintrin.h",)

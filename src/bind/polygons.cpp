@@ -1,11 +1,10 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/string_view.h>
-
 #include <array>
-#include <cstring>
+#include <memory>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "bind/arrays.hpp"
@@ -69,7 +68,7 @@ constexpr std::string_view fault_text(RingFault fault) {
 }
 
 /// How many items each rung answered.
-using RungCounts = std::array<std::int64_t, 3>;
+using RungCounts = std::array<std::int64_t, 4>;
 
 struct ContactRows {
     std::uint8_t* status;
@@ -122,6 +121,21 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
     return points;
 }
 
+/// Points as an array that keeps their vector alive: copying many into fresh memory costs as much as finding
+/// some.
+nb::object rows_of(std::vector<Vec2> points) {
+    if (points.empty()) {
+        return empty<double>({0, 2}).array;
+    }
+    auto kept = std::make_unique<std::vector<Vec2>>(std::move(points));
+    const std::size_t count = kept->size();
+    double* const data = &kept->front().x;
+    const nb::capsule owner(kept.get(),
+                            [](void* vector) noexcept { delete static_cast<std::vector<Vec2>*>(vector); });
+    [[maybe_unused]] const auto* const owned = kept.release();
+    return nb::cast(nb::ndarray<nb::numpy, double, nb::shape<-1, 2>, nb::c_contig>(data, {count, 2}, owner));
+}
+
 struct DistanceRows {
     double* distance;
     double* lower;
@@ -130,6 +144,8 @@ struct DistanceRows {
     Vec2* point_b;
     Vec2* normal;
     std::uint8_t* status;
+    bool* meet;
+    bool* certain;
 };
 
 template <class Solver>
@@ -147,7 +163,9 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
         rows.point_b[i] = found.point_b;
         rows.normal[i] = found.normal;
         rows.status[i] = kOk;
-        ++counts[static_cast<std::size_t>(found.rung) - 1];
+        rows.meet[i] = found.meet;
+        rows.certain[i] = found.certain;
+        ++counts[static_cast<std::size_t>(found.rung)];
     }
 }
 
@@ -195,7 +213,7 @@ void define_polygons(nb::module_& m) {
         "first_contact_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
            const Offsets& offsets_b, const Rows2& velocity_a, const Rows2& velocity_b, double t_max,
-           bool contact_set, std::string_view accuracy) {
+           bool contact_set, const char* accuracy) {
             const MovingRings a(vertices_a, offsets_a, velocity_a);
             const MovingRings b(vertices_b, offsets_b, velocity_b);
             const std::size_t count = pair_count(a.rings, b.rings);
@@ -219,13 +237,10 @@ void define_polygons(nb::module_& m) {
                         return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
                     });
             }
-            const auto points = empty<double>({found.size(), 2});
-            if (!found.empty()) {
-                std::memcpy(points.data, found.data(), found.size() * sizeof(Vec2));
-            }
             return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
-                                  last_time.array, normal.array, points.array, point_offsets.array,
-                                  certain.array, nb::make_tuple(counts[0], counts[1], counts[2]));
+                                  last_time.array, normal.array, rows_of(std::move(found)),
+                                  point_offsets.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
@@ -234,7 +249,7 @@ void define_polygons(nb::module_& m) {
     m.def(
         "distance_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
-           const Offsets& offsets_b, bool penetration, std::string_view accuracy) {
+           const Offsets& offsets_b, bool penetration, const char* accuracy) {
             const Rings a(vertices_a, offsets_a);
             const Rings b(vertices_b, offsets_b);
             const std::size_t count = pair_count(a, b);
@@ -245,13 +260,17 @@ void define_polygons(nb::module_& m) {
             const auto point_b = empty<double>({count, 2});
             const auto normal = empty<double>({count, 2});
             const auto status = empty<std::uint8_t>({count});
+            const auto meet = empty<bool>({count});
+            const auto certain = empty<bool>({count});
             const DistanceRows rows{distance.data,
                                     lower.data,
                                     upper.data,
                                     reinterpret_cast<Vec2*>(point_a.data),
                                     reinterpret_cast<Vec2*>(point_b.data),
                                     reinterpret_cast<Vec2*>(normal.data),
-                                    status.data};
+                                    status.data,
+                                    meet.data,
+                                    certain.data};
             RungCounts counts{};
             {
                 const nb::gil_scoped_release unlocked;
@@ -261,8 +280,8 @@ void define_polygons(nb::module_& m) {
                     });
             }
             return nb::make_tuple(distance.array, lower.array, upper.array, point_a.array, point_b.array,
-                                  normal.array, status.array,
-                                  nb::make_tuple(counts[0], counts[1], counts[2]));
+                                  normal.array, status.array, meet.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(), nb::arg("penetration"),

@@ -20,6 +20,8 @@ struct PolygonDistance {
     Vec2 point_a;  ///< nearest point of a; its deepest point in b; or, depth not asked for, a common point
     Vec2 point_b;  ///< likewise of b; point_b = point_a + distance * normal up to rounding
     Vec2 normal;   ///< unit, from a to b: moving b by depth * normal parts them
+    bool meet = false;         ///< whether they have a common point
+    bool certain = true;       ///< ... as is proven for the given numbers
     Rung rung = Rung::filter;  ///< what it took
 };
 

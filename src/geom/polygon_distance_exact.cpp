@@ -60,28 +60,6 @@ GEOMSRV_WIDE_CLONES Widest widths_of(const PolygonPair& pair) {
     return {greatest(widest), all(overlap)};
 }
 
-/// Exactly, for the given coordinates; lists the axes along which the polygons touch.
-Relation relation_of(const PolygonPair& pair, bool flat, std::vector<AxisOf>& touching) {
-    touching.clear();
-    for (const int side : {0, 1}) {
-        const PairedPolygon& p = pair.side(side);
-        for (std::size_t k = 0; k < (flat ? p.axes : p.edges); ++k) {
-            if (p.work[1][k] < 0.0) {
-                continue;
-            }
-            const AxisOf axis{side, k};
-            const int sign = pair.sign_of_gap(axis, pair.lowest(axis));
-            if (sign > 0) {
-                return Relation::apart;
-            }
-            if (sign == 0) {
-                touching.push_back(axis);
-            }
-        }
-    }
-    return touching.empty() ? Relation::overlapping : Relation::touching;
-}
-
 /// Where the other polygon is over an edge: its lowest vertex, or its lowest edge in the direction of this
 /// one.
 struct Over {
@@ -142,7 +120,7 @@ Nearest nearest_of(const PolygonPair& pair, double least_width) {
             const bool proven = over.beside
                                     ? is_nearest_vertex(p, over.own_vertex, q.ring[over.other_vertex]) &&
                                           is_nearest_vertex(q, over.other_vertex, p.ring[over.own_vertex])
-                                    : pair.sign_of_gap(axis, vertex) > 0;
+                                    : sign_of_gap(pair, axis, vertex) > 0;
             if (proven) {
                 return {true, axis, !over.beside, over};
             }
@@ -224,22 +202,6 @@ bool apart(const PolygonPair& pair, const Nearest& nearest, PolygonDistance& out
     return true;
 }
 
-/// Whether the direction from a to b along one axis comes before that along the other, to choose between
-/// equals.
-bool is_before(const PolygonPair& pair, AxisOf p, AxisOf q) {
-    const auto ends = [&pair](AxisOf axis) {
-        const PairedPolygon& side = pair.side(axis.side);
-        const Vec2 from = axis.index < side.edges ? side.ring[axis.index] : Vec2{};
-        // A turned edge for a normal: the order is as good.
-        const Vec2 to = axis.index < side.edges ? side.ring[side.next(axis.index)]
-                                                : Vec2{-side.dy[axis.index], side.dx[axis.index]};
-        return axis.side == 0 ? std::pair{from, to} : std::pair{to, from};
-    };
-    const auto [from_p, to_p] = ends(p);
-    const auto [from_q, to_q] = ends(q);
-    return is_before(from_p, to_p, from_q, to_q);
-}
-
 /// A width along an axis, not rounded.
 template <class A>
 struct Width {
@@ -297,8 +259,9 @@ PolygonDistance ExactPolygonDistanceSolver::solve(Ring a, Ring b, bool penetrati
     const Widest widest = widths_of(pair_);
     const Relation relation = widest.lower > 0.0 ? Relation::apart
                               : widest.overlap   ? Relation::overlapping
-                                                 : relation_of(pair_, is_flat(pair_), touching_);
+                                                 : relation_of(pair_, is_flat(pair_), 1, touching_);
     PolygonDistance out;
+    out.meet = relation != Relation::apart;
     switch (relation) {
         case Relation::apart: {
             Nearest nearest = nearest_of(pair_, widest.lower);
@@ -314,7 +277,7 @@ PolygonDistance ExactPolygonDistanceSolver::solve(Ring a, Ring b, bool penetrati
             for (const AxisOf other : touching_) {
                 axis = is_before(pair_, other, axis) ? other : axis;
             }
-            const std::size_t vertex = pair_.lowest(axis);
+            const std::size_t vertex = lowest_along(pair_, axis);
             const bool is_edge = axis.index < pair_.side(axis.side).edges;
             const Over over = is_edge ? over_edge(pair_, axis, vertex) : Over{vertex, vertex};
             out.rung = climb(in_range, [&](auto arithmetic) {
@@ -335,7 +298,7 @@ PolygonDistance ExactPolygonDistanceSolver::solve(Ring a, Ring b, bool penetrati
         for (const Vec2 corner : corners) {
             middle = middle + share * corner;
         }
-        out = {0.0, 0.0, 0.0, middle, middle, out.normal, out.rung};
+        out = {0.0, 0.0, 0.0, middle, middle, out.normal, true, true, out.rung};
     }
     return out;
 }

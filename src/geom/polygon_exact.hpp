@@ -10,7 +10,8 @@
 #pragma once
 
 #include <cmath>
-#include <utility>
+#include <cstddef>
+#include <vector>
 
 #include "geom/double_double.hpp"
 #include "geom/enclosed.hpp"
@@ -95,14 +96,17 @@ Rung climb(bool in_range, const Question& question) {
     return Rung::exact;
 }
 
-/// The outward normal of an edge; a tip's axis is what it is by definition.
+/// Two points whose difference, turned by -90 degrees, is an axis: an edge's ends; for the tip of a segment
+/// such that the axis points along it; else the tip's axis as it is.
+struct AxisEnds {
+    Vec2 from, to;
+};
+AxisEnds ends_of(const PolygonPair& pair, AxisOf axis);
+
 template <class A>
 typename A::Vector normal_of(const PolygonPair& pair, AxisOf axis) {
-    const PairedPolygon& p = pair.side(axis.side);
-    if (axis.index >= p.edges) {
-        return A::vector(p.axis(axis.index));
-    }
-    const typename A::Vector edge = A::difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
+    const AxisEnds ends = ends_of(pair, axis);
+    const typename A::Vector edge = A::difference(ends.to, ends.from);
     return {edge.y, -edge.x};
 }
 
@@ -116,14 +120,28 @@ typename A::Vector across(const PolygonPair& pair, AxisOf axis, std::size_t vert
 /// Whether the difference of the polygons has no area.  Then tips bound it too, otherwise edges are enough.
 bool is_flat(const PolygonPair& pair);
 
+/// Axes of a polygon that bound the difference.
+inline std::size_t axes_of(const PairedPolygon& p, bool flat) { return flat ? p.axes : p.edges; }
+
+/// The vertex of the other polygon that is lowest along one of those axes, and the sign of the gap: exactly.
+std::size_t lowest_along(const PolygonPair& pair, AxisOf axis);
+int sign_of_gap(const PolygonPair& pair, AxisOf axis, std::size_t lowest);
+
+/// The vertex of the other polygon beside `vertex` that is exactly as low along the axis of an edge, or
+/// `vertex` itself if there is none.
+std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex);
+
 /// How two polygons lie.
 enum class Relation { apart, touching, overlapping };
 
-/// The vertex of `level` beside `vertex` that is exactly as low along the axis of an edge, or `vertex` itself
-/// if there is none.
-std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex);
+/// Exactly; `touching` gets the axes along which the gap is zero.  `most` tells which work array holds upper
+/// bounds of the gaps.
+Relation relation_of(const PolygonPair& pair, bool flat, std::size_t most, std::vector<AxisOf>& touching);
 
 /// Whether direction p comes before q in the order of angles in [0, 360) degrees, each given by two points.
-bool is_before(Vec2 from_p, Vec2 to_p, Vec2 from_q, Vec2 to_q);
+bool is_before(const AxisEnds& p, const AxisEnds& q);
+
+/// The same for two axes, as directions from a to b: to choose between equals, however vertices are numbered.
+bool is_before(const PolygonPair& pair, AxisOf p, AxisOf q);
 
 }  // namespace geomsrv

@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -65,6 +66,11 @@ struct Motion {
     ExactVec2 exact;  ///< the same, unrounded
     int scale_exponent = 0;
     double noise = 0.0;  ///< what rounding of the given velocities may change
+
+    /// A given velocity in these units.
+    [[nodiscard]] Vec2 scaled(Vec2 v) const {
+        return {std::scalbn(v.x, scale_exponent), std::scalbn(v.y, scale_exponent)};
+    }
 };
 
 Motion relative_motion(Vec2 velocity_a, Vec2 velocity_b) {
@@ -106,7 +112,8 @@ struct Slacks {
     double reach;
     double rate_noise;  ///< per |D|_1
     double turn_noise;
-    double rate_limit;  ///< per |D|_1
+    double rate_limit;      ///< per |D|_1
+    double rate_underflow;  ///< products with a velocity of zero are exact: at rest nothing approaches
 
     Slacks(const PolygonPair& pair, const Motion& motion)
         : gap_rounding(pair.gap_error()),
@@ -115,7 +122,8 @@ struct Slacks {
           reach(pair.reach()),
           rate_noise(motion.noise),
           turn_noise(gap_noise * (std::fabs(motion.velocity.x) + std::fabs(motion.velocity.y))),
-          rate_limit(kLargestSlack * std::max(std::fabs(motion.velocity.x), std::fabs(motion.velocity.y))) {}
+          rate_limit(kLargestSlack * std::max(std::fabs(motion.velocity.x), std::fabs(motion.velocity.y))),
+          rate_underflow(rate_limit > 0.0 ? kPairUnderflow : 0.0) {}
 
     [[nodiscard]] Slack heights() const { return {gap_noise, gap_limit}; }
 };
@@ -137,8 +145,11 @@ GEOMSRV_INLINE AxisNumbers<Real> numbers(const Real& dx, const Real& dy, const R
         lesser<Real>(slacks.gap_noise * (size + Real(slacks.reach)), slacks.gap_limit * size);
     const Real rate_noise =
         lesser<Real>(slacks.rate_noise * size + Real(slacks.turn_noise), slacks.rate_limit * size);
+    // Axes of no length fill up blocks of lanes: subnormal rates there would slow down the whole block.
+    const Real none = 0.0;
+    const Real rate_underflow = select(none < size, Real(slacks.rate_underflow), none);
     return {gap, along_x + along_y, slacks.gap_rounding * size + gap_noise + Real(kPairUnderflow),
-            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise + Real(kPairUnderflow)};
+            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise + rate_underflow};
 }
 
 constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
@@ -194,6 +205,56 @@ GEOMSRV_WIDE_CLONES Window window_of(const PolygonPair& pair, const Motion& moti
     return {greatest(enter), least(leave), any(apart), any(parting), all(deep)};
 }
 
+// Candidates are kept as bits, 64 axes at a time: to branch on every block costs more than all of its
+// arithmetic, as nobody can predict which block holds one.
+struct CandidateBits {
+    std::uint64_t entries = 0;
+    std::uint64_t exits = 0;
+};
+
+/// Lane i of a block of axes as bit 4 block + i.
+GEOMSRV_INLINE LaneMask bits_of_block(const LaneMask& set, std::size_t block) {
+    static_assert(kLanes == 4);
+    const LaneMask::Vector bits{1, 2, 4, 8};
+    return set & LaneMask(bits << static_cast<std::int64_t>(kLanes * block));
+}
+
+GEOMSRV_INLINE std::uint64_t joined(const LaneMask& bits) {
+    return static_cast<std::uint64_t>((bits.v[0] | bits.v[1]) | (bits.v[2] | bits.v[3]));
+}
+
+GEOMSRV_WIDE_CLONES CandidateBits candidate_bits(const PairedPolygon& p, std::size_t first, std::size_t end,
+                                                 const Window& window) {
+    const Lanes zero = 0.0;
+    LaneMask entries = zero < zero;
+    LaneMask exits = entries;
+    for (std::size_t k = first, block = 0; k < end; k += kLanes, ++block) {
+        const Lanes most = Lanes::load(p.work[0] + k);
+        const Lanes slowest = Lanes::load(p.work[1] + k);
+        const Lanes closing = Lanes::load(p.work[2] + k);
+        // most / slowest >= enter if it approaches for certain; else it may begin at any time.
+        const LaneMask begins = (zero < most) & (Lanes(window.enter) * slowest <= most);
+        // most / slowest <= leave, both negative.  Sliding within the slack does not end a contact.
+        const LaneMask ends = (closing < zero) & (Lanes(window.leave) * slowest <= most);
+        entries = entries | bits_of_block(begins, block);
+        exits = exits | bits_of_block(ends, block);
+    }
+    return {joined(entries), joined(exits)};
+}
+
+/// Whether the polygons as given are certainly in contact at that time: no axis can be open then.  (Slacks for
+/// rounding of the input, which are not needed here, are more than what this comparison rounds.)
+GEOMSRV_WIDE_CLONES bool are_in_contact(const PolygonPair& pair, double time) {
+    LaneMask closed = Lanes(0.0) <= Lanes(0.0);
+    for (const int i : {0, 1}) {
+        const PairedPolygon& p = pair.side(i);
+        for (std::size_t k = 0; k < p.axes; k += kLanes) {
+            closed = closed & (Lanes::load(p.work[0] + k) <= Lanes(time) * Lanes::load(p.work[1] + k));
+        }
+    }
+    return all(closed);
+}
+
 /// How many axes `candidates_of` has listed.
 struct Candidates {
     std::size_t entries = 0;
@@ -203,47 +264,24 @@ struct Candidates {
 /// Axes that may set the first or the last contact, found without a division per axis: those along which
 /// contact may begin no earlier than `window.enter`, and those along which it may end no later than
 /// `window.leave`, which are the outermost bounds.  Mostly it is one axis each.
-GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Window& window, AxisOf* entries,
-                                             AxisOf* exits) {
+Candidates candidates_of(const PolygonPair& pair, const Window& window, AxisOf* entries, AxisOf* exits) {
+    constexpr std::size_t kRow = 64;
     Candidates found;
-    const Lanes zero = 0.0;
+    const auto list = [](std::uint64_t bits, int side, std::size_t first, AxisOf* axes, std::size_t count) {
+        for (; bits != 0; bits &= bits - 1) {
+            axes[count++] = {side, first + static_cast<std::size_t>(std::countr_zero(bits))};
+        }
+        return count;
+    };
     for (const int i : {0, 1}) {
         const PairedPolygon& p = pair.side(i);
-        for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const Lanes most = Lanes::load(p.work[0] + k);
-            const Lanes slowest = Lanes::load(p.work[1] + k);
-            const Lanes closing = Lanes::load(p.work[2] + k);
-            // most / slowest >= enter if it approaches for certain; else it may begin at any time.
-            const LaneMask begins = (zero < most) & (Lanes(window.enter) * slowest <= most);
-            // most / slowest <= leave, both negative.  Sliding within the slack does not end a contact.
-            const LaneMask ends = (closing < zero) & (Lanes(window.leave) * slowest <= most);
-            if (!any(begins | ends)) {
-                continue;
-            }
-            for (std::size_t lane = 0; lane < kLanes; ++lane) {
-                if (begins.v[lane] != 0) {
-                    entries[found.entries++] = {i, k + lane};
-                }
-                if (ends.v[lane] != 0) {
-                    exits[found.exits++] = {i, k + lane};
-                }
-            }
+        for (std::size_t first = 0; first < p.axes; first += kRow) {
+            const CandidateBits bits = candidate_bits(p, first, std::min(first + kRow, p.axes), window);
+            found.entries = list(bits.entries, i, first, entries, found.entries);
+            found.exits = list(bits.exits, i, first, exits, found.exits);
         }
     }
     return found;
-}
-
-/// Relative error of `quotient`: Joldes, Muller, Popescu 2017, algorithm DWDivDW2, has 15; one for the bound.
-constexpr double kQuotientError = 16.0 * 0x1p-106;
-
-DoubleDouble quotient(DoubleDouble a, DoubleDouble b) {
-    const double first = a.hi / b.hi;
-    if (!(std::fabs(first) < kInfinity)) {
-        return {first, 0.0};
-    }
-    const DoubleDouble product = two_product(first, b.hi);
-    const double rest = ((a.hi - product.hi) - product.lo) + (a.lo - first * b.lo);
-    return quick_two_sum(first, rest / b.hi);
 }
 
 /// A time and proven bounds.
@@ -513,14 +551,17 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     const Motion motion = relative_motion(a.velocity, b.velocity);
     const Slacks slacks(pair_, motion);
     const Window window = window_of(pair_, motion, slacks);
+    FirstContact never = kNever;
+    never.certain = true;
     if (window.never || window.enter > window.leave) {
-        return kNever;
+        return never;
     }
     // Times are in units of scaled length over scaled speed.  One later than the largest double counts as
     // never.
     const Seconds seconds{motion.scale_exponent - pair_.scale_exponent()};
     if (!(seconds.nearest(window.enter) <= std::min(t_max, kLargest))) {
-        return kNever;
+        never.certain = seconds.nearest(window.enter) > t_max;
+        return never;
     }
 
     const Candidates candidates = candidates_of(pair_, window, entries_.data(), exits_.data());
@@ -541,13 +582,19 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         result.time_lower = std::min(seconds.down(entry.lower), result.time);
     } else {
         result.status = window.deep ? ContactStatus::overlapping : ContactStatus::touching;
-        axis = pair_.widest_gap();
     }
     result.time_upper =
         std::max(std::min(seconds.up(std::min(entry.upper, window.leave)), t_max), result.time);
     result.last_time = std::max(std::min(seconds.nearest(exit), t_max), result.time);
+    result.certain = window.apart
+                         ? are_in_contact(pair_, std::min(0.5 * (moment + exit),
+                                                          next_down(seconds.inverse(t_max))))
+                         : window.deep;
     result.normal = {kNaN, kNaN};
     if (result.status != ContactStatus::overlapping) {
+        if (result.status == ContactStatus::touching) {
+            axis = pair_.widest_gap();
+        }
         const Vec2 outward_axis = pair_.side(axis.side).axis(axis.index);
         result.normal = unit(axis.side == 0 ? outward_axis : -outward_axis);
     }
@@ -559,10 +606,18 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         if (!result.points.empty()) {
             return result;
         }
+        axis = pair_.widest_gap();
     }
     const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
     const auto moved = [&](const Mark& mark) {
-        return pair_.side(mark.side).ring[mark.vertex] + result.time * (mark.side == 0 ? a : b).velocity;
+        const Vec2 from = pair_.side(mark.side).ring[mark.vertex];
+        const Vec2 velocity = (mark.side == 0 ? a : b).velocity;
+        if (motion.scale_exponent == 0 && pair_.scale_exponent() == 0) {
+            return from + result.time * velocity;
+        }
+        // The time in seconds may be subnormal, its product with a velocity beyond the doubles.
+        const Vec2 way = moment * motion.scaled(velocity);
+        return pair_.moved(from, {way.x, 0.0}, {way.y, 0.0});
     };
     const bool one_vertex = marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex;
     const Vec2 low = moved(marks.low);

@@ -127,7 +127,7 @@ GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Wind
     const Lanes zero = 0.0;
     for (const int i : {0, 1}) {
         const PairedPolygon& p = pair.side(i);
-        const std::size_t count = flat ? p.axes : p.edges;
+        const std::size_t count = axes_of(p, flat);
         for (std::size_t k = 0; k < count; k += kLanes) {
             const Lanes most = Lanes::load(p.work[0] + k);
             const Lanes slowest = Lanes::load(p.work[1] + k);
@@ -149,28 +149,6 @@ GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Wind
         }
     }
     return found;
-}
-
-/// Exactly, for the given coordinates at the start; lists the axes along which the polygons touch.
-Relation relation_of(const PolygonPair& pair, bool flat, std::vector<AxisOf>& touching) {
-    touching.clear();
-    for (const int side : {0, 1}) {
-        const PairedPolygon& p = pair.side(side);
-        for (std::size_t k = 0; k < (flat ? p.axes : p.edges); ++k) {
-            if (p.work[0][k] < 0.0) {
-                continue;
-            }
-            const AxisOf axis{side, k};
-            const int sign = pair.sign_of_gap(axis, pair.lowest(axis));
-            if (sign > 0) {
-                return Relation::apart;
-            }
-            if (sign == 0) {
-                touching.push_back(axis);
-            }
-        }
-    }
-    return !touching.empty() ? Relation::touching : Relation::overlapping;
 }
 
 /// What is known before exact numbers are asked for.
@@ -196,7 +174,7 @@ struct Clip {
 
 template <class A>
 Clip<A> clip_along(const Query& query, AxisOf axis) {
-    Clip<A> clip{axis, query.pair.lowest(axis), normal_of<A>(query.pair, axis), {}, {}};
+    Clip<A> clip{axis, lowest_along(query.pair, axis), normal_of<A>(query.pair, axis), {}, {}};
     clip.gap = dot(clip.normal, across<A>(query.pair, axis, clip.vertex));
     const Motion& motion = query.motion;
     clip.rate = dot(clip.normal, axis.side == 0 ? A::difference(motion.velocity_a, motion.velocity_b)
@@ -211,32 +189,32 @@ int compare_times(const Clip<A>& p, const Clip<A>& q) {
 }
 
 /// Whether p is the axis to call the normal rather than q: along it the polygons approach faster, or it is
-/// the more clockwise one.  2 if this arithmetic cannot tell.
+/// the more clockwise one, or, of opposite ones, its angle is smaller.  kUncertain if this arithmetic cannot
+/// tell.
 template <class A>
-int is_preferred(const Clip<A>& p, const Clip<A>& q) {
+int is_preferred(const PolygonPair& pair, const Clip<A>& p, const Clip<A>& q) {
     const int sign_p = sign_of(p.rate);
     const int sign_q = sign_of(q.rate);
     if (sign_p == kUncertain || sign_q == kUncertain) {
         return kUncertain;
     }
     int order = sign_p - sign_q;
-    if (order == 0) {
-        order = sign_p * sign_of(p.rate * p.rate * dot(q.normal, q.normal) -
-                                 q.rate * q.rate * dot(p.normal, p.normal));
-        if (order == kUncertain || order == -kUncertain) {
-            return kUncertain;
-        }
-    }
-    if (order == 0) {
-        const typename A::Vector turned{p.normal.y, -p.normal.x};
-        order = sign_of(dot(turned, q.normal));
+    if (order == 0 && sign_p != 0) {
+        order =
+            sign_of(p.rate * p.rate * dot(q.normal, q.normal) - q.rate * q.rate * dot(p.normal, p.normal));
         if (order == kUncertain) {
             return kUncertain;
         }
-        // Normals point away from their own polygon.
-        order = p.axis.side == q.axis.side ? -order : order;
+        order *= sign_p;
     }
-    return order > 0 ? 1 : 0;
+    if (order == 0) {
+        const AxisEnds ends_p = ends_of(pair, p.axis);
+        const AxisEnds ends_q = ends_of(pair, q.axis);
+        order = sign_of_cross(ends_p.from, ends_p.to, ends_q.from, ends_q.to);
+        // Normals point away from their own polygon.
+        order = p.axis.side == q.axis.side ? order : -order;
+    }
+    return order > 0 || (order == 0 && is_before(pair, p.axis, q.axis)) ? 1 : 0;
 }
 
 /// Answers, except for the contact set of polygons that overlap at the start; false if the arithmetic cannot
@@ -325,7 +303,7 @@ private:
             }
             int later = found ? compare_times(clip, entry_) : 1;
             if (later == 0) {
-                later = is_preferred(clip, entry_);
+                later = is_preferred(query_.pair, clip, entry_);
             }
             if (later == kUncertain) {
                 return false;
@@ -375,7 +353,7 @@ private:
         bool found = false;
         for (const AxisOf axis : query_.touching) {
             Clip<A> clip = clip_along<A>(query_, axis);
-            const int preferred = found ? is_preferred(clip, entry_) : 1;
+            const int preferred = found ? is_preferred(query_.pair, clip, entry_) : 1;
             if (preferred == kUncertain) {
                 return false;
             }
@@ -493,7 +471,7 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
     const bool flat = is_flat(pair_);
     Query query{pair_, motion, t_max, contact_set, Relation::apart, {}, {}, {}};
     if (!window.apart) {
-        query.relation = window.deep ? Relation::overlapping : relation_of(pair_, flat, touching_);
+        query.relation = window.deep ? Relation::overlapping : relation_of(pair_, flat, 0, touching_);
         query.touching = touching_;
     }
     const Candidates candidates = candidates_of(pair_, window, flat, entries_.data(), exits_.data());

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "geom/exact_sign.hpp"
+#include "geom/lanes.hpp"
 
 namespace geomsrv {
 
@@ -20,24 +21,39 @@ constexpr bool same(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
 /// A segment has one edge here, not two.
 std::size_t lines_of(const PairedPolygon& p) { return p.edges == 2 ? 1 : p.edges; }
 
+/// Sides of all vertices of p beyond one edge of q; whether some are not certain, which are left at 0.
+GEOMSRV_WIDE_CLONES bool find_sides_of(const PairedPolygon& p, const PairedPolygon& q, std::size_t edge,
+                                       double error, std::int8_t* to) {
+    const double dx = q.dx[edge];
+    const double dy = q.dy[edge];
+    const double own = q.own(edge);
+    bool doubt = false;
+    for (std::size_t i = 0; i < p.ring.size(); ++i) {
+        const double height = (dx * p.x[i] + dy * p.y[i]) - own;
+        to[i] = static_cast<std::int8_t>((height > error) - (height < -error));
+        doubt = doubt || to[i] == 0;
+    }
+    return doubt;
+}
+
 }  // namespace
 
 /// On which side of every edge of the other polygon the vertices of a polygon are.
 void ExactPolygonOverlap::find_sides(const PolygonPair& pair, int side) {
     const PairedPolygon& p = pair.side(side);
     const PairedPolygon& q = pair.other(side);
-    const std::size_t edges = q.edges;
-    sides_[side].resize(p.ring.size() * edges);
-    std::int8_t* to = sides_[side].data();
-    for (std::size_t i = 0; i < p.ring.size(); ++i) {
-        for (std::size_t k = 0; k < edges; ++k, ++to) {
-            const double height = dot(q.axis(k), p.local(i)) - q.own(k);
-            const double error =
-                kFilterError * pair.gap_error() * (std::fabs(q.dx[k]) + std::fabs(q.dy[k])) + kPairUnderflow;
-            const int sign = height > error    ? 1
-                             : -height > error ? -1
-                                               : -orientation(q.ring[k], q.ring[q.next(k)], p.ring[i]);
-            *to = static_cast<std::int8_t>(sign);
+    const std::size_t count = p.ring.size();
+    sides_[side].resize(count * q.edges);
+    for (std::size_t k = 0; k < q.edges; ++k) {
+        std::int8_t* const to = sides_[side].data() + k * count;
+        const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
+        if (!find_sides_of(p, q, k, kFilterError * pair.gap_error() * size + kPairUnderflow, to)) {
+            continue;
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            if (to[i] == 0) {
+                to[i] = static_cast<std::int8_t>(-orientation(q.ring[k], q.ring[q.next(k)], p.ring[i]));
+            }
         }
     }
 }
@@ -49,7 +65,7 @@ bool ExactPolygonOverlap::is_inside(const PolygonPair& pair, int side, std::size
         return same(v, q.ring[0]);
     }
     for (std::size_t k = 0; k < q.edges; ++k) {
-        if (side_of(side, vertex, k, q.edges) > 0) {
+        if (side_of(pair, side, vertex, k) > 0) {
             return false;
         }
     }
@@ -74,7 +90,7 @@ void ExactPolygonOverlap::add_vertices(const PolygonPair& pair, int side) {
             // On the boundary of both, the one that turns further to the left is the boundary of the
             // intersection.
             const Vec2 end = q.ring[q.next(k)];
-            if (side_of(side, i, k, q.edges) == 0 && !same(v, end) &&
+            if (side_of(pair, side, i, k) == 0 && !same(v, end) &&
                 (p.edges == 0 || sign_of_cross(v, p.ring[p.next(i)], q.ring[k], end) > 0)) {
                 corner.side = 1 - side;
                 corner.edge = k;
@@ -90,9 +106,9 @@ void ExactPolygonOverlap::add_crossings(const PolygonPair& pair, bool in_range, 
     for (std::size_t i = 0; i < lines_of(a); ++i) {
         const std::size_t i_end = a.next(i);
         for (std::size_t k = 0; k < lines_of(b); ++k) {
-            const int start_side = side_of(0, i, k, b.edges);
-            const bool crosses = start_side * side_of(0, i_end, k, b.edges) < 0 &&
-                                 side_of(1, k, i, a.edges) * side_of(1, b.next(k), i, a.edges) < 0;
+            const int start_side = side_of(pair, 0, i, k);
+            const bool crosses = start_side * side_of(pair, 0, i_end, k) < 0 &&
+                                 side_of(pair, 1, k, i) * side_of(pair, 1, b.next(k), i) < 0;
             if (!crosses) {
                 continue;
             }
@@ -124,7 +140,8 @@ std::span<const Vec2> ExactPolygonOverlap::of(const PolygonPair& pair, bool in_r
         std::sort(corners_.begin(), corners_.end(), [&pair](const Corner& c, const Corner& d) {
             const PairedPolygon& p = pair.side(c.side);
             const PairedPolygon& q = pair.side(d.side);
-            return is_before(p.ring[c.edge], p.ring[p.next(c.edge)], q.ring[d.edge], q.ring[q.next(d.edge)]);
+            return is_before({p.ring[c.edge], p.ring[p.next(c.edge)]},
+                             {q.ring[d.edge], q.ring[q.next(d.edge)]});
         });
     } else {
         std::sort(corners_.begin(), corners_.end(), [](const Corner& c, const Corner& d) {

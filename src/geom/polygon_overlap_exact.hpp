@@ -34,14 +34,15 @@ private:
     };
 
     void find_sides(const PolygonPair& pair, int side);
-    [[nodiscard]] int side_of(int side, std::size_t vertex, std::size_t edge, std::size_t edges) const {
-        return sides_[side][vertex * edges + edge];
+    /// On which side of an edge of the other polygon a vertex is: beyond it (+1), on its line, behind.
+    [[nodiscard]] int side_of(const PolygonPair& pair, int side, std::size_t vertex, std::size_t edge) const {
+        return sides_[side][edge * pair.side(side).ring.size() + vertex];
     }
     [[nodiscard]] bool is_inside(const PolygonPair& pair, int side, std::size_t vertex) const;
     void add_vertices(const PolygonPair& pair, int side);
     void add_crossings(const PolygonPair& pair, bool in_range, Rung& rung);
 
-    std::vector<std::int8_t> sides_[2];  // of every vertex of a polygon, beyond (+1) every edge of the other
+    std::vector<std::int8_t> sides_[2];
     std::vector<Corner> corners_;
     std::vector<Vec2> points_;
 };

@@ -260,11 +260,6 @@ Chain extend_level(const PairedPolygon& q, Vec2 axis, Chain chain, std::size_t l
     return chain;
 }
 
-DoubleDouble difference_of(double to, double from, double before, double scale) {
-    const DoubleDouble apart = two_sum(before * to, -(before * from));
-    return {scale * apart.hi, scale * apart.lo};
-}
-
 }  // namespace
 
 PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
@@ -332,7 +327,7 @@ bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
         if (n > 2 && !placed[i].strict && !known_strict) {
             return false;
         }
-        if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0) {
+        if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0 && !known_strict) {
             return false;
         }
         if ((placed[i].has_tips || n == 2) && !append_tips(p)) {
@@ -368,8 +363,17 @@ void PolygonPair::project() {
     gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kUnitRoundoff * reach_;
 }
 
-ExactVec2 PolygonPair::difference(Vec2 to, Vec2 from) const {
-    return {difference_of(to.x, from.x, before_, scale_), difference_of(to.y, from.y, before_, scale_)};
+Vec2 PolygonPair::moved(Vec2 from, DoubleDouble x, DoubleDouble y) const {
+    const auto at = [this](double start, DoubleDouble way) {
+        const double scaled = scale_ * (before_ * start);
+        // It overflows only where this coordinate is the same all over a pair that is far smaller.
+        if (!std::isfinite(scaled)) {
+            return start + std::scalbn(way.hi, -scale_exponent_);
+        }
+        const double end = (DoubleDouble{scaled, 0.0} + way).hi;
+        return scale_exponent_ == 0 ? end : std::scalbn(end, -scale_exponent_);
+    };
+    return {at(from.x, x), at(from.y, y)};
 }
 
 int PolygonPair::sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const {
@@ -424,15 +428,6 @@ AxisOf PolygonPair::widest_gap() const {
         consider(i, side(i).edges, side(i).axes);
     }
     return best;
-}
-
-ExactVec2 PolygonPair::exact_axis(AxisOf axis) const {
-    const PairedPolygon& p = side(axis.side);
-    if (axis.index >= p.edges) {
-        return {{p.dx[axis.index], 0.0}, {p.dy[axis.index], 0.0}};
-    }
-    const ExactVec2 edge = difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
-    return {edge.y, -edge.x};
 }
 
 Enclosed PolygonPair::enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const {

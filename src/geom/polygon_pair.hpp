@@ -117,9 +117,13 @@ struct Slack {
     double limit = 0.0;
 };
 
-/// Unit vector, whatever the length of v; v is not zero.
+/// Unit vector, whatever the length of v; zero for zero, which an edge may be that is far smaller than the
+/// pair.
 inline Vec2 unit(Vec2 v) {
     const double largest = std::max(std::fabs(v.x), std::fabs(v.y));
+    if (largest == 0.0) {
+        return {};
+    }
     const Vec2 reduced{v.x / largest, v.y / largest};
     return (1.0 / norm(reduced)) * reduced;
 }
@@ -150,7 +154,19 @@ public:
     [[nodiscard]] double gap_error() const { return gap_error_; }
 
     /// The exact difference of two given points, times the scale.
-    [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const;
+    [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const {
+        const auto apart = [this](double end, double start) -> DoubleDouble {
+            const DoubleDouble way = two_sum(before_ * end, -(before_ * start));
+            return {scale_ * way.hi, scale_ * way.lo};
+        };
+        return {apart(to.x, from.x), apart(to.y, from.y)};
+    }
+    /// The same, rounded, from one point to the other.
+    [[nodiscard]] Vec2 way(Vec2 from, Vec2 to) const {
+        return {scale_ * (before_ * to.x - before_ * from.x), scale_ * (before_ * to.y - before_ * from.y)};
+    }
+    /// A given point moved by a scaled vector, rounded once; only an end beyond the doubles is infinite.
+    [[nodiscard]] Vec2 moved(Vec2 from, DoubleDouble x, DoubleDouble y) const;
 
     /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
     [[nodiscard]] std::size_t lowest(AxisOf axis) const;
@@ -165,7 +181,14 @@ public:
     [[nodiscard]] AxisOf widest_gap() const;
 
     /// The axis itself: exact for edges, and for tips by definition.
-    [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const;
+    [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const {
+        const PairedPolygon& p = side(axis.side);
+        if (axis.index >= p.edges) {
+            return {{p.dx[axis.index], 0.0}, {p.dy[axis.index], 0.0}};
+        }
+        const ExactVec2 edge = difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
+        return {edge.y, -edge.x};
+    }
     /// Gap along an axis to twice the precision, and its exact sign; `vertex` is the `lowest`.
     [[nodiscard]] Enclosed enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const;
     [[nodiscard]] int sign_of_gap(AxisOf axis, std::size_t vertex) const;
