@@ -23,7 +23,7 @@ from polygon_scenes import polygons, random_ring
 import geomsrv as gs
 from geomsrv.answers import json_line
 from geomsrv.cli import main
-from geomsrv.verify import CertificateError, verify_record
+from geomsrv.verify import CertificateError, verify_lines, verify_record
 
 TIERS = ["float64", "exact"]
 CHECKER = Path(__file__).resolve().parents[1] / "geomsrv" / "verify.py"
@@ -249,6 +249,24 @@ def test_broken_record_is_refused(change) -> None:
     BROKEN[change](record)
     with pytest.raises(CertificateError):
         verify_record(record)
+
+
+@pytest.mark.parametrize("scene", ["cull", "first contact"])
+def test_radius_is_for_distances_only(scene, rng) -> None:
+    record = SCENES[scene](rng)
+    record["b"]["radius"] = 0.5
+    with pytest.raises(CertificateError, match="^no radius is expected here$"):
+        verify_record(record)
+
+
+def test_nesting_without_end_is_refused() -> None:
+    nested: list = []
+    for _ in range(100_000):
+        nested = [nested]
+    body = {"kind": "hull", "vertices": nested}
+    with pytest.raises(CertificateError, match="RecursionError"):
+        verify_record({"query": "distance", "a": body, "b": body, "claim": {"meets": True}, "evidence": {}})
+    assert [fault for _, _, fault in verify_lines(["[" * 100_000])] != [""]
 
 
 def test_nothing_is_proven_of_what_claims_nothing() -> None:
