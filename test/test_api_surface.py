@@ -51,7 +51,8 @@ cull(frustum, boxes, *, accuracy='float64', certificates=False)
 distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False)
 first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', contact_set=True,
     certificates=False)
-distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',), certificates=False)
+distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',),
+    certificates=False)
 intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False)
 verify(answer)
 verify_record(record)
@@ -64,7 +65,8 @@ ATTRIBUTES = {
     "Cull": "state certain cost certificates",
     "Distances": "distance lower upper point_a point_b normal status region cost certificates",
     "Booleans": "value certain status cost certificates",
-    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain cost certificates",
+    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain cost "
+    "certificates",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",
     "SceneUpdate": "add remove clear",
