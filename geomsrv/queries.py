@@ -80,7 +80,7 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     _expect(boxes, Boxes, "boxes")
     tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
     _validate.certificates(certificates)
-    state, certain, counts, *_ = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier)
+    state, certain, counts, *_ = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents, tier, False)
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     return Cull(state, certain, Cost(time.perf_counter_ns() - start, tier, stages))
 

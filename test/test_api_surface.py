@@ -257,7 +257,8 @@ def test_engine_refuses_what_it_would_have_to_copy(name: str) -> None:
     """Another dtype or layout means that the edge was bypassed: a TypeError, never a silent copy."""
     function = getattr(_core, name)
     arrays = array_arguments(function.__nb_signature__[0][0])
-    rest = [0.0 if kind == "float" else True for _, kind in stub_functions()[name] if kind in ("float", "bool")]
+    plain = {"float": 0.0, "bool": True, "str": "float64"}
+    rest = [plain[kind] for _, kind in stub_functions()[name] if kind in plain]
     assert len(arrays) + len(rest) == len(stub_functions()[name])
     for i, array in enumerate(arrays):
         others = [array.astype(np.float32), np.repeat(array, 2, axis=0)[::2]]

@@ -373,7 +373,7 @@ void define_frustum(nb::module_& m) {
                 simplex.array, beyond.array);
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
-        nb::arg("half_extents").noconvert(), nb::arg("accuracy") = "float64", nb::arg("evidence") = false);
+        nb::arg("half_extents").noconvert(), nb::arg("accuracy"), nb::arg("evidence"));
     m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>,
           nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
     m.def("distance_to_frustum_2d", distance_to_frustum_batch<1, PackedFrustum2D, Rows2>,
