@@ -16,6 +16,7 @@ _Stages = tuple[_U, _I]
 
 def first_nonfinite(values: _F) -> int: ...
 def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
+
 # state, certain, decided by bound, filter, wide, exact and left uncertain, and with `evidence` the arrays of
 # CullEvidence (cull_evidence.hpp): simplex (n, 4, 2), beyond (n, 2)
 def cull(
