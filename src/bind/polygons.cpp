@@ -1,9 +1,10 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
-#include <cstring>
+#include <memory>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "bind/arrays.hpp"
@@ -120,6 +121,21 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
     return points;
 }
 
+/// Points as an array that keeps their vector alive: copying many into fresh memory costs as much as finding
+/// some.
+nb::object rows_of(std::vector<Vec2> points) {
+    if (points.empty()) {
+        return empty<double>({0, 2}).array;
+    }
+    auto kept = std::make_unique<std::vector<Vec2>>(std::move(points));
+    const std::size_t count = kept->size();
+    double* const data = &kept->front().x;
+    const nb::capsule owner(kept.get(),
+                            [](void* vector) noexcept { delete static_cast<std::vector<Vec2>*>(vector); });
+    [[maybe_unused]] const auto* const owned = kept.release();
+    return nb::cast(nb::ndarray<nb::numpy, double, nb::shape<-1, 2>, nb::c_contig>(data, {count, 2}, owner));
+}
+
 struct DistanceRows {
     double* distance;
     double* lower;
@@ -221,13 +237,10 @@ void define_polygons(nb::module_& m) {
                         return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
                     });
             }
-            const auto points = empty<double>({found.size(), 2});
-            if (!found.empty()) {
-                std::memcpy(points.data, found.data(), found.size() * sizeof(Vec2));
-            }
             return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
-                                  last_time.array, normal.array, points.array, point_offsets.array,
-                                  certain.array, nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
+                                  last_time.array, normal.array, rows_of(std::move(found)),
+                                  point_offsets.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
