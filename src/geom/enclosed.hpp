@@ -38,9 +38,6 @@ inline constexpr double kBoundRounding = 1.0 + 16 * kUnitRoundoff;
 // Parts of a product that leave the normal range lose at most a few 2^-1074 each.
 inline constexpr double kEnclosedUnderflow = 0x1p-1060;
 
-// A product of two doubles has 106 bits: if it is larger than this, all of them are above 2^-1022.
-inline constexpr double kWholeProduct = 0x1p-900;
-
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble sum = a.value + b.value;
@@ -56,15 +53,12 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble product = a.value * b.value;
     const double size_a = std::fabs(a.value.hi);
     const double size_b = std::fabs(b.value.hi);
-    const double size = std::fabs(product.hi);
-    // Of two doubles the product is found without rest, unless it is so small that parts of it underflow.
     const bool exact = a.value.lo == 0.0 && b.value.lo == 0.0;
+    const double rounding = exact ? 0.0 : kWideRoundoff * std::fabs(product.hi);
     const bool zero = (size_a == 0.0 && a.error == 0.0) || (size_b == 0.0 && b.error == 0.0);
-    const double rounding = exact ? 0.0 : kWideRoundoff * size;
-    const double underflow = zero || (exact && size > kWholeProduct) ? 0.0 : kEnclosedUnderflow;
     return {product,
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
-                underflow};
+                (zero ? 0.0 : kEnclosedUnderflow)};
 }
 
 /// What `sign_of` answers where the error does not let it decide.

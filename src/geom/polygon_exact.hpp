@@ -32,7 +32,7 @@ inline Enclosed dot(const ExactVec2& a, const ExactVec2& b) {
     const bool zero_y = a.y.hi == 0.0 || b.y.hi == 0.0;
     // Both products fit in a double, and so large a double that nothing was lost below it.
     const auto is_whole = [](DoubleDouble p, DoubleDouble q, DoubleDouble product) {
-        return p.lo == 0.0 && q.lo == 0.0 && product.lo == 0.0 && std::fabs(product.hi) > kWholeProduct;
+        return p.lo == 0.0 && q.lo == 0.0 && product.lo == 0.0 && std::fabs(product.hi) > kNoUnderflow;
     };
     if ((zero_x || is_whole(a.x, b.x, x)) && (zero_y || is_whole(a.y, b.y, y))) {
         return {value, 0.0};
