@@ -291,8 +291,6 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& 
     };
     LocalFrame frame;
     frame.origin = a.is_box ? a.box.center : a.origin + middle_of(a.hull);
-    const ExactBody exact_a = exact_body(a);
-    const ExactBody exact_b = exact_body(b);
     const CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
@@ -302,7 +300,8 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& 
         [&] { return std::max(magnitude(a), magnitude(b)); },
         [&](const LocalPair& pair, double scale) {
             if (wanted.tier == Tier::exact) {
-                return exact_convex_convex({exact_a, pair.a.core}, {exact_b, pair.b.core}, scale, wanted);
+                return exact_convex_convex({exact_body(a), pair.a.core}, {exact_body(b), pair.b.core}, scale,
+                                           wanted);
             }
             CoreSeparation out = convex_convex(pair.a.core, pair.b.core, wanted.penetration);
             unscale(out, scale);

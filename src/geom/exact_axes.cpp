@@ -92,8 +92,6 @@ private:
         }
     }
 
-    static bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
-
     /// The pairs of lines that may span the facet with the largest gap.
     int filtered(Candidate* out) const {
         const Vec3 middle = b_.rough.center - a_.rough.center;

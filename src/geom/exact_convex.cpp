@@ -94,9 +94,10 @@ private:
     CoreSeparation with_points(const Witness& s) const {
         CoreSeparation out;
         out.witness = s;
+        const double unit = 1.0 / scale_;
         for (int i = 0; i < s.count; ++i) {
-            out.point_a = out.point_a + (s.weight[i] / scale_) * vertex_of(a_.rough, s.a[i]);
-            out.point_b = out.point_b + (s.weight[i] / scale_) * vertex_of(b_.rough, s.b[i]);
+            out.point_a = out.point_a + (unit * s.weight[i]) * vertex_of(a_.rough, s.a[i]);
+            out.point_b = out.point_b + (unit * s.weight[i]) * vertex_of(b_.rough, s.b[i]);
         }
         return out;
     }

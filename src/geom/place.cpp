@@ -41,8 +41,6 @@ Rounded rounded(WideVec3 v, double size) {
     return {narrow(v), safe_norm({v.x.lo, v.y.lo, v.z.lo}) + 8 * kWideRoundoff * size};
 }
 
-bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
-
 /// scale * (R m + t - origin): far from the origin these cancel, so the sum is formed in double-double.
 Rounded relative_wide(Vec3 m, const Transform& X_ls, const LocalFrame& frame, bool turned) {
     const Vec3 t = frame.scale * X_ls.translation;
