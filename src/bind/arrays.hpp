@@ -59,7 +59,7 @@ inline void* huge_pages(std::size_t bytes) {
 /// An array to be filled.
 template <class T>
 Output<T> empty(std::initializer_list<std::size_t> shape) {
-    static_assert(sizeof(T) == 1 || sizeof(T) == 8);
+    static_assert(sizeof(T) == 1 || sizeof(T) == 4 || sizeof(T) == 8);
     const std::size_t bytes =
         std::accumulate(shape.begin(), shape.end(), sizeof(T), std::multiplies<std::size_t>());
     if (bytes >= 2 * kHugePage) {
@@ -70,6 +70,7 @@ Output<T> empty(std::initializer_list<std::size_t> shape) {
     }
     const char* dtype = std::is_same_v<T, double>         ? "float64"
                         : std::is_same_v<T, std::int64_t> ? "int64"
+                        : std::is_same_v<T, std::int32_t> ? "int32"
                         : std::is_same_v<T, bool>         ? "bool"
                                                           : "uint8";
     nb::list sizes;

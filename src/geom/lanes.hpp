@@ -7,11 +7,13 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 // One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the
 // processor has it.  Both give the same bits, because contraction is off and a fused multiply-add is only
 // where std::fma says so.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#include <immintrin.h>
 #define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
 #else
 #define GEOMSRV_WIDE_CLONES
@@ -94,6 +96,32 @@ GEOMSRV_INLINE Real greater(const Real& a, const Real& b) {
     return select(b < a, a, b);
 }
 
+GEOMSRV_INLINE void store(const LaneMask& mask, std::int64_t* to) {
+    Lanes((Lanes::Vector)mask.v).store(reinterpret_cast<double*>(to));
+}
+GEOMSRV_INLINE LaneMask load_mask(const std::int64_t* from) {
+    return LaneMask((LaneMask::Vector)Lanes::load(reinterpret_cast<const double*>(from)).v);
+}
+
+/// x where the condition holds, else 0.
+GEOMSRV_INLINE Lanes kept(const LaneMask& condition, const Lanes& x) {
+    return Lanes((Lanes::Vector)(condition.v & (LaneMask::Vector)x.v));
+}
+/// x with its sign changed where s is negative.
+GEOMSRV_INLINE Lanes with_sign_of(const Lanes& s, const Lanes& x) {
+    constexpr std::int64_t kSign = std::numeric_limits<std::int64_t>::min();
+    return Lanes((Lanes::Vector)(((LaneMask::Vector)s.v & kSign) ^ (LaneMask::Vector)x.v));
+}
+/// The greatest power of two that is not above x, for normal x > 0.
+GEOMSRV_INLINE Lanes power_of_two_in(const Lanes& x) {
+    constexpr std::int64_t kExponent = 0x7ff0000000000000;
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v & kExponent));
+}
+/// The `steps`-th next double, for normal x > 0.
+GEOMSRV_INLINE Lanes neighbour(const Lanes& x, const LaneMask::Vector& steps) {
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v + steps));
+}
+
 GEOMSRV_INLINE double least(const Lanes& a) { return lesser(lesser(a[0], a[1]), lesser(a[2], a[3])); }
 GEOMSRV_INLINE double greatest(const Lanes& a) { return greater(greater(a[0], a[1]), greater(a[2], a[3])); }
 
@@ -121,6 +149,43 @@ GEOMSRV_INLINE Lanes fused_multiply_add(const Lanes& a, const Lanes& b, const La
     return Lanes(Lanes::Vector{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1]),
                                std::fma(a[2], b[2], c[2]), std::fma(a[3], b[3], c[3])});
 }
+
+/// a b + c with two roundings, and what a b loses by its own.
+struct TwoRoundings {
+    GEOMSRV_INLINE static Lanes multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) {
+        return a * b + c;
+    }
+    /// a b - product; by splitting the factors (Veltkamp, Dekker).
+    GEOMSRV_INLINE static Lanes product_error(const Lanes& a, const Lanes& b, const Lanes& product) {
+        const Lanes splitter = 134217729.0;  // 2^27 + 1 halves the 53 bits
+        const Lanes ca = splitter * a, cb = splitter * b;
+        const Lanes a1 = ca - (ca - a), b1 = cb - (cb - b);
+        const Lanes a2 = a - a1, b2 = b - b1;
+        return ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2;
+    }
+};
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"  // the value never leaves the function it melts into
+/// The same with one rounding, for kernels whose error bounds hold for both.  Only inside of a function marked
+/// GEOMSRV_FUSED; where the processor `has_fused`.
+struct OneRounding {
+    GEOMSRV_INLINE static Lanes multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) {
+        return Lanes(Lanes::Vector(__builtin_ia32_vfmaddpd256(a.v, b.v, c.v)));
+    }
+    GEOMSRV_INLINE static Lanes product_error(const Lanes& a, const Lanes& b, const Lanes& product) {
+        return multiply_add(a, b, -product);
+    }
+};
+#pragma GCC diagnostic pop
+#define GEOMSRV_FUSED __attribute__((target("avx2,fma")))
+inline bool has_fused() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+#else
+using OneRounding = TwoRoundings;
+#define GEOMSRV_FUSED
+inline bool has_fused() { return false; }
+#endif
 
 GEOMSRV_INLINE double square_root(double x) { return std::sqrt(x); }
 GEOMSRV_INLINE long double square_root(long double x) { return std::sqrt(x); }
