@@ -11,12 +11,21 @@ _U = NDArray[np.uint8]
 _B = NDArray[np.bool_]
 # distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
 _Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
+# the same, then rung (n,) (Rung in separation.hpp) and, as evidence, the simplex (n, 4, 2) of vertices of the difference
+_ProvenDistances = tuple[_F, _F, _F, _F, _F, _F, _U, _U, NDArray[np.int32] | None]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
+# items answered by bounding volumes, by the filter, in double-double, exactly
+_Rungs = tuple[int, int, int, int]
 
 def first_nonfinite(values: _F) -> int: ...
 def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
-def cull(frustum: _F, center: _F, axes: _F, half_extents: _F) -> tuple[_U, _B, tuple[int, int, int]]: ...
+
+# state, certain, decided by bound, filter, wide, exact and left uncertain, and with `evidence` the arrays of
+# CullEvidence (cull_evidence.hpp): simplex (n, 4, 2), beyond (n, 2)
+def cull(
+    frustum: _F, center: _F, axes: _F, half_extents: _F, accuracy: str = "float64", evidence: bool = False
+) -> tuple[_U, _B, tuple[int, int, int, int, int], NDArray[np.int32] | None, NDArray[np.int8] | None]: ...
 def distance_to_frustum(frustum: _F, points: _F, witness: bool) -> tuple[_F, _F, _F, _U, _F | None]: ...
 def distance_to_frustum_2d(frustum: _F, points: _F, witness: bool) -> tuple[_F, _F, _F, _U, _F | None]: ...
 def first_contact_polygons(
@@ -28,69 +37,16 @@ def first_contact_polygons(
     velocity_b: _F,
     t_max: float,
     contact_set: bool,
-) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I]: ...
+    accuracy: str = "float64",
+) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _Rungs]: ...
 def distance_polygons(
-    vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool
-) -> _Distances: ...
-def distance_boxes(
-    center_a: _F,
-    axes_a: _F,
-    half_extents_a: _F,
-    center_b: _F,
-    axes_b: _F,
-    half_extents_b: _F,
-    penetration: bool,
-) -> _Distances: ...
-def distance_boxes_stages(
-    center_a: _F,
-    axes_a: _F,
-    half_extents_a: _F,
-    center_b: _F,
-    axes_b: _F,
-    half_extents_b: _F,
-    penetration: bool,
-) -> _Stages: ...
-def distance_boxes_polytopes(
-    center_a: _F,
-    axes_a: _F,
-    half_extents_a: _F,
-    vertices_b: _F,
-    offsets_b: _I,
-    origin_b: _F,
-    error_b: _F,
-    penetration: bool,
-) -> _Distances: ...
-def distance_polytopes(
-    vertices_a: _F,
-    offsets_a: _I,
-    origin_a: _F,
-    error_a: _F,
-    vertices_b: _F,
-    offsets_b: _I,
-    origin_b: _F,
-    error_b: _F,
-    penetration: bool,
-) -> _Distances: ...
-def distance_boxes_polytopes_stages(
-    center_a: _F,
-    axes_a: _F,
-    half_extents_a: _F,
-    vertices_b: _F,
-    offsets_b: _I,
-    origin_b: _F,
-    error_b: _F,
-    penetration: bool,
-) -> _Stages: ...
-def distance_polytopes_stages(
-    vertices_a: _F,
-    offsets_a: _I,
-    origin_a: _F,
-    error_a: _F,
-    vertices_b: _F,
-    offsets_b: _I,
-    origin_b: _F,
-    error_b: _F,
-    penetration: bool,
+    vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool, accuracy: str = "float64"
+) -> tuple[_F, _F, _F, _F, _F, _F, _U, _B, _B, _Rungs]: ...
+def distance_world(
+    a: tuple[_F | _I, ...], b: tuple[_F | _I, ...], penetration: bool, accuracy: str = "float64", evidence: bool = False
+) -> _ProvenDistances: ...
+def distance_world_stages(
+    a: tuple[_F | _I, ...], b: tuple[_F | _I, ...], penetration: bool, accuracy: str = "float64", evidence: bool = False
 ) -> _Stages: ...
 def shape_kinds() -> tuple[str, ...]: ...
 def supported_pairs() -> _B: ...
@@ -102,7 +58,10 @@ def distance_pairs(
     pairs: _I,
     poses_ab: _F,
     penetration: bool,
-) -> _Distances: ...
+    accuracy: str = "float64",
+    evidence: bool = False,
+    frusta: _F | None = None,
+) -> _ProvenDistances: ...
 def distance_pairs_stages(
     kinds: _U,
     params: _F,
@@ -111,6 +70,9 @@ def distance_pairs_stages(
     pairs: _I,
     poses_ab: _F,
     penetration: bool,
+    accuracy: str = "float64",
+    evidence: bool = False,
+    frusta: _F | None = None,
 ) -> _Stages: ...
 def distance_placed(
     kinds: _U,

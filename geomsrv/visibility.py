@@ -75,7 +75,7 @@ def _by_box(world: World, rows: IntArray, frustum: Frustum) -> tuple[ByteArray, 
     margin = np.where(exact | np.isinf(scale), 0.0, AABB_ROUNDING * scale) + world.uncertainty[rows]
     center = position + np.einsum("nij,nj->ni", turn, table.center[shape])
     axes = np.ascontiguousarray(np.swapaxes(turn, 1, 2))
-    state, certain, _ = _core.cull(frustum.packed(), center, axes, half + margin[:, None])
+    state, certain, *_ = _core.cull(frustum.packed(), center, axes, half + margin[:, None])
     return state, certain
 
 
@@ -107,7 +107,7 @@ def _by_shape(world: World, rows: IntArray, frustum: Frustum) -> tuple[ByteArray
         pairs = np.column_stack([np.zeros(len(known), np.int64), 1 + np.flatnonzero(answered)])
         poses = world.poses[rows[known]].copy()
         poses[:, :3] -= frustum.origin
-        gap, lower, upper, _, _, _, status = _core.distance_pairs(*packed, pairs, poses, True)
+        gap, lower, upper, _, _, _, status = _core.distance_pairs(*packed, pairs, poses, True)[:7]
         scale = np.abs(frustum.origin).max() + np.abs(corners).max() + np.abs(poses[:, :3]).max(axis=1)
         rounding = AABB_ROUNDING * scale + slack[known]
         meets = np.where(gap <= 0.0, Visibility.INTERSECTS, Visibility.OUTSIDE)

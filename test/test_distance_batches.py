@@ -132,9 +132,8 @@ def test_lengths_must_agree() -> None:
 def test_engine_refuses_arrays_of_different_length() -> None:
     boxes = random_boxes(np.random.default_rng(0), 2)
     with pytest.raises(ValueError, match="different length"):
-        _core.distance_boxes(
-            boxes.center, boxes.axes, boxes.half_extents[:1], boxes.center, boxes.axes, boxes.half_extents, True
-        )
+        side = boxes.center, boxes.axes, boxes.half_extents
+        _core.distance_world((*side[:2], side[2][:1]), side, True)
 
 
 def test_a_large_batch(rng: np.random.Generator) -> None:

@@ -63,8 +63,8 @@ def test_boxes_against_the_oracle(rng: np.random.Generator) -> None:
         answer, unsigned = gs.distance(a, b, want=DEEP), gs.distance(a, b)
         inputs = {"half_a": half_a, "axes_a": axes_a, "center": center, "half_b": half_b, "axes_b": axes_b}
         check_answer(answer, unsigned, square, 0, reach, far=far, scale=scale, **inputs)
-        arrays = [x for box in (a, b) for x in (box.center, box.axes, box.half_extents)]
-        tally.add(_core.distance_boxes_stages(*arrays, True)[0][0], square)
+        sides = [(box.center, box.axes, box.half_extents) for box in (a, b)]
+        tally.add(_core.distance_world_stages(*sides, True)[0][0], square)
     tally.require(gjk=60, gjk_wide=1, facet_axes=80, hull=2, apart=60, overlapping=60, touching=2)
 
 
@@ -83,8 +83,8 @@ def test_hulls_against_the_oracle(kind: str, rng: np.random.Generator) -> None:
         reach = max(reach, 1e-30 * np.abs(a).max())
         answer, unsigned = gs.distance(*bodies, want=DEEP), gs.distance(*bodies)
         check_answer(answer, unsigned, square, 0, reach, a=a, b=b)
-        tables = [x for body in bodies for x in (body.vertices, body.offsets, np.zeros((1, 3)), np.zeros(1))]
-        tally.add(_core.distance_polytopes_stages(*tables, True)[0][0], square)
+        sides = [(body.vertices, body.offsets) for body in bodies]
+        tally.add(_core.distance_world_stages(*sides, True)[0][0], square)
     tally.require(gjk=20, hull=10 if kind != "segment" else 1, apart=15, touching=3)
 
 

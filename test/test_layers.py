@@ -37,7 +37,7 @@ PYTHON_LAYERS = {
     "scene": ("geomsrv/*.py", ("numpy",)),
     "query": (
         "geomsrv/queries.py geomsrv/shapes.py geomsrv/answers.py geomsrv/_validate.py geomsrv/errors.py "
-        "geomsrv/_version.py",
+        "geomsrv/certificates.py geomsrv/evidence.py geomsrv/verify.py geomsrv/_version.py",
         ("numpy",),
     ),
     "engine": ("geomsrv/_core.pyi", ("numpy",)),
@@ -45,7 +45,7 @@ PYTHON_LAYERS = {
 
 # Optional peers, imported on use.  "*" marks a file that may choose the module's name at run time.
 OPTIONAL = {
-    "geomsrv/fcl_worker.py": ("fcl",),
+    "geomsrv/fcl_worker.py": ("coal", "fcl"),
     "geomsrv/robot.py": ("*",),
 }
 

@@ -15,6 +15,8 @@
 #include <new>
 #include <numeric>
 
+#include "geom/frustum.hpp"
+
 namespace geomsrv::bind {
 
 namespace nb = nanobind;
@@ -29,10 +31,23 @@ using Rows2 = Input<double, nb::shape<-1, 2>>;
 using Rows3 = Input<double, nb::shape<-1, 3>>;
 using Rows4 = Input<double, nb::shape<-1, 4>>;
 using Rows7 = Input<double, nb::shape<-1, 7>>;
+using Rows18 = Input<double, nb::shape<-1, 18>>;
 using Matrices3 = Input<double, nb::shape<-1, 3, 3>>;
 using Offsets = Input<std::int64_t, nb::ndim<1>>;
 using Pairs = Input<std::int64_t, nb::shape<-1, 2>>;
 using Codes = Input<std::uint8_t, nb::ndim<1>>;
+
+/// As `Frustum.packed` lists it.
+inline Frustum unpacked_frustum(const double* p) {
+    return {.origin = {p[0], p[1], p[2]},
+            .axes = {{{p[3], p[4], p[5]}, {p[6], p[7], p[8]}, {p[9], p[10], p[11]}}},
+            .l0 = p[12],
+            .l1 = p[13],
+            .u0 = p[14],
+            .u1 = p[15],
+            .near = p[16],
+            .far = p[17]};
+}
 
 /// A result: numpy owns the memory, `data` is where the batch loop writes (with the GIL released).
 template <class T>
@@ -71,6 +86,7 @@ Output<T> empty(std::initializer_list<std::size_t> shape) {
     const char* dtype = std::is_same_v<T, double>         ? "float64"
                         : std::is_same_v<T, std::int64_t> ? "int64"
                         : std::is_same_v<T, std::int32_t> ? "int32"
+                        : std::is_same_v<T, std::int8_t>  ? "int8"
                         : std::is_same_v<T, bool>         ? "bool"
                                                           : "uint8";
     nb::list sizes;

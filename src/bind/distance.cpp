@@ -1,9 +1,17 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
 // Distances of shape pairs, boxes and polytopes: one batch loop per signature.
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string_view.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "bind/arrays.hpp"
@@ -16,17 +24,32 @@ namespace geomsrv::bind {
 
 namespace {
 
-/// Where a batch of answers goes: distance, lower, upper, point_a, point_b, normal, status.
+Tier tier_of(std::string_view accuracy) {
+    constexpr std::string_view kNames[] = {"bound", "float32", "float64", "exact"};
+    const auto* const found = std::find(std::begin(kNames), std::end(kNames), accuracy);
+    if (found == std::end(kNames)) {
+        throw nb::value_error("distance: unknown accuracy");
+    }
+    return static_cast<Tier>(found - std::begin(kNames));
+}
+
+/// Where a batch of answers goes: distance, lower, upper, point_a, point_b, normal, status; and with
+/// `everything` the rung of the ladder and, if wanted, the proving simplex.
 class Answers {
 public:
-    explicit Answers(std::size_t n)
+    Answers(std::size_t n, bool simplex)
         : distance_(empty<double>({n})),
           lower_(empty<double>({n})),
           upper_(empty<double>({n})),
           point_a_(empty<double>({n, 3})),
           point_b_(empty<double>({n, 3})),
           normal_(empty<double>({n, 3})),
-          status_(empty<std::uint8_t>({n})) {}
+          status_(empty<std::uint8_t>({n})),
+          rung_(empty<std::uint8_t>({n})) {
+        if (simplex) {
+            simplex_ = empty<std::int32_t>({n, 4, 2});
+        }
+    }
 
     void set(std::size_t i, const Separation& s) const {
         distance_.data[i] = s.distance;
@@ -36,11 +59,23 @@ public:
         set(point_b_.data + 3 * i, s.point_b);
         set(normal_.data + 3 * i, s.normal);
         status_.data[i] = static_cast<std::uint8_t>(s.outcome);
+        rung_.data[i] = static_cast<std::uint8_t>(s.rung);
+        if (simplex_.data != nullptr) {
+            std::int32_t* row = simplex_.data + 8 * i;
+            for (int k = 0; k < 4; ++k) {
+                *row++ = k < s.simplex.count ? s.simplex.a[k] : -1;
+                *row++ = k < s.simplex.count ? s.simplex.b[k] : -1;
+            }
+        }
     }
 
     nb::tuple tuple() const {
         return nb::make_tuple(distance_.array, lower_.array, upper_.array, point_a_.array, point_b_.array,
                               normal_.array, status_.array);
+    }
+    nb::tuple everything() const {
+        return nb::make_tuple(distance_.array, lower_.array, upper_.array, point_a_.array, point_b_.array,
+                              normal_.array, status_.array, rung_.array, simplex_.array);
     }
 
 private:
@@ -57,20 +92,21 @@ private:
     Output<double> point_b_;
     Output<double> normal_;
     Output<std::uint8_t> status_;
+    Output<std::uint8_t> rung_;
+    Output<std::int32_t> simplex_{nb::none()};
 };
 
 /// How the answers came about: stage and iterations, for tests that must know that they reached a branch.
 class Stages {
 public:
-    explicit Stages(std::size_t n)
-        : stage_(empty<std::uint8_t>({n})), iterations_(empty<std::int64_t>({n})) {}
+    Stages(std::size_t n, bool) : stage_(empty<std::uint8_t>({n})), iterations_(empty<std::int64_t>({n})) {}
 
     void set(std::size_t i, const Separation& s) const {
         stage_.data[i] = static_cast<std::uint8_t>(s.stage);
         iterations_.data[i] = s.iterations;
     }
 
-    nb::tuple tuple() const { return nb::make_tuple(stage_.array, iterations_.array); }
+    nb::tuple everything() const { return nb::make_tuple(stage_.array, iterations_.array); }
 
 private:
     Output<std::uint8_t> stage_;
@@ -80,9 +116,10 @@ private:
 /// The shapes of a batch, each looked through once.
 class ShapeTable {
 public:
+    /// `frusta`: 18 numbers per shape, all 0 for one that is none; nullptr where there are none.
     ShapeTable(std::size_t count, const std::uint8_t* kinds, const double* params, const double* vertices,
-               const std::int64_t* offsets)
-        : extents_(count) {
+               const std::int64_t* offsets, const double* frusta = nullptr)
+        : extents_(count), frusta_(frusta == nullptr ? 0 : count) {
         shapes_.reserve(count);
         for (std::size_t i = 0; i < count; ++i) {
             ShapeView shape{static_cast<ShapeKind>(kinds[i]), params + 4 * i, vertices + 3 * offsets[i],
@@ -90,6 +127,10 @@ public:
             if (shape.kind == ShapeKind::convex) {
                 extents_[i] = extent_of(shape);
                 shape.extent = &extents_[i];
+            }
+            if (frusta != nullptr) {
+                frusta_[i] = unpacked_frustum(frusta + 18 * i);
+                shape.frustum = frusta_[i].far > 0.0 ? &frusta_[i] : nullptr;
             }
             shapes_.push_back(shape);
         }
@@ -99,6 +140,7 @@ public:
 
 private:
     std::vector<HullExtent> extents_;
+    std::vector<Frustum> frusta_;
     std::vector<ShapeView> shapes_;
 };
 
@@ -113,29 +155,31 @@ std::size_t longest(const std::int64_t* offsets, std::size_t count) {
 
 template <class Sink>
 nb::tuple distance_pairs(const Codes& kinds, const Rows4& params, const Rows3& vertices,
-                         const Offsets& offsets, const Pairs& pairs, const Rows7& poses_ab,
-                         bool penetration) {
+                         const Offsets& offsets, const Pairs& pairs, const Rows7& poses_ab, bool penetration,
+                         std::string_view accuracy, bool evidence, const std::optional<Rows18>& frusta) {
     const std::size_t shapes = kinds.size();
     const std::size_t n = pairs.shape(0);
-    if (params.shape(0) != shapes || offsets.size() != shapes + 1 || poses_ab.shape(0) != n) {
+    if (params.shape(0) != shapes || offsets.size() != shapes + 1 || poses_ab.shape(0) != n ||
+        (frusta && frusta->shape(0) != shapes)) {
         throw nb::value_error("distance_pairs: arrays of different length");
     }
-    const Sink out(n);
+    const Sink out(n, evidence);
+    const Wanted wanted{penetration, tier_of(accuracy), evidence};
     {
         const nb::gil_scoped_release unlocked;
-        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data());
+        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data(),
+                               frusta ? frusta->data() : nullptr);
         std::vector<double> scratch(6 * longest(offsets.data(), shapes));
         for (std::size_t i = 0; i < n; ++i) {
             const ShapeView& a = table.shape(pairs.data()[2 * i]);
             const ShapeView& b = table.shape(pairs.data()[2 * i + 1]);
             const Transform X_ab = pose_of(poses_ab.data() + 7 * i);
-            out.set(i, shape_distance(a, b, X_ab, penetration, scratch.data()));
+            out.set(i, shape_distance(a, b, X_ab, wanted, scratch.data()));
         }
     }
-    return out.tuple();
+    return out.everything();
 }
 
-template <class Sink>
 nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& vertices,
                           const Offsets& offsets, const Values& reach, const Offsets& shape,
                           const Rows7& poses, const Values& uncertainty, const Pairs& pairs,
@@ -147,7 +191,7 @@ nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& 
         poses.shape(0) != objects || uncertainty.size() != objects) {
         throw nb::value_error("distance_placed: arrays of different length");
     }
-    const Sink out(n);
+    const Answers out(n, false);
     {
         const nb::gil_scoped_release unlocked;
         const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data());
@@ -168,16 +212,16 @@ nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& 
 
 Vec3 vec3_at(const double* row) { return {row[0], row[1], row[2]}; }
 
-/// Boxes of a batch; one serves every pair.
+/// Boxes of a batch: center (n, 3), axes (n, 3, 3), half extents (n, 3).
 struct BoxRows {
-    const Rows3& center;
-    const Matrices3& axes;
-    const Rows3& half_extents;
+    Rows3 center;
+    Matrices3 axes;
+    Rows3 half_extents;
 
     std::size_t count() const { return center.shape(0); }
     bool consistent() const { return axes.shape(0) == count() && half_extents.shape(0) == count(); }
-    WorldBody body(std::size_t i) const {
-        const std::size_t row = count() == 1 ? 0 : i;
+    std::size_t scratch_size() const { return 0; }
+    WorldBody body(std::size_t row, HullExtent&) const {
         const double* m = axes.data() + 9 * row;
         WorldBody out;
         out.is_box = true;
@@ -188,94 +232,123 @@ struct BoxRows {
     }
 };
 
-/// Hulls of a batch; one serves every pair.
+constexpr double kGivenExactly[4] = {};  // how far listed vertices may be from the ones meant
+
+/// `extent` must outlive the body.
+WorldBody hull_body(const double* vertices, std::ptrdiff_t count, HullExtent& extent) {
+    WorldBody out;
+    out.hull = {ShapeKind::convex, kGivenExactly, vertices, count};
+    extent = extent_of(out.hull);
+    out.hull.extent = &extent;
+    return out;
+}
+
+/// Hulls of a batch: vertices (m, 3), offsets (n + 1,).
 struct HullRows {
-    const Rows3& vertices;
-    const Offsets& offsets;
-    const Rows3& origin;
-    const Values& error;
+    Rows3 vertices;
+    Offsets offsets;
 
     std::size_t count() const { return offsets.size() - 1; }
-    bool consistent() const { return origin.shape(0) == count() && error.size() == count(); }
+    bool consistent() const { return true; }
     std::size_t scratch_size() const { return 3 * longest(offsets.data(), count()); }
-    /// `extent` must outlive the body.
-    WorldBody body(std::size_t i, HullExtent& extent) const {
-        const std::size_t row = count() == 1 ? 0 : i;
-        WorldBody out;
-        out.hull = {ShapeKind::convex, error.data() + row, vertices.data() + 3 * offsets.data()[row],
-                    static_cast<std::ptrdiff_t>(offsets.data()[row + 1] - offsets.data()[row])};
-        extent = extent_of(out.hull);
-        out.hull.extent = &extent;
-        out.origin = vec3_at(origin.data() + 3 * row);
-        return out;
+    WorldBody body(std::size_t row, HullExtent& extent) const {
+        const std::int64_t begin = offsets.data()[row];
+        return hull_body(vertices.data() + 3 * begin, offsets.data()[row + 1] - begin, extent);
     }
 };
 
+/// A frustum as packed (18,), its corners relative to the apex (8, 3), and how far each may be off (1,).
+class OneFrustum {
+public:
+    OneFrustum(const Input<double, nb::shape<18>>& packed, Rows3 corners, const Values& error)
+        : frustum_(unpacked_frustum(packed.data())), corners_(std::move(corners)), params_{error.data()[0]} {}
+
+    std::size_t count() const { return 1; }
+    bool consistent() const { return corners_.shape(0) == 8; }
+    std::size_t scratch_size() const { return 3 * corners_.shape(0); }
+    WorldBody body(std::size_t, HullExtent& extent) const {
+        WorldBody out = hull_body(corners_.data(), 8, extent);
+        out.hull.params = params_;
+        out.hull.frustum = &frustum_;
+        out.origin = frustum_.origin;
+        return out;
+    }
+
+private:
+    Frustum frustum_;
+    Rows3 corners_;
+    double params_[4];
+};
+
+/// One side of a batch; a single body serves every pair.
+class WorldSide {
+public:
+    explicit WorldSide(const nb::tuple& arrays) : rows_(rows_of(arrays)) {
+        if (!std::visit([](const auto& rows) { return rows.consistent(); }, rows_)) {
+            throw nb::value_error("distance: arrays of different length");
+        }
+    }
+
+    std::size_t count() const {
+        return std::visit([](const auto& rows) { return rows.count(); }, rows_);
+    }
+    std::size_t scratch_size() const {
+        return std::visit([](const auto& rows) { return rows.scratch_size(); }, rows_);
+    }
+    WorldBody body(std::size_t i, HullExtent& extent) const {
+        const std::size_t row = count() == 1 ? 0 : i;
+        return std::visit([&](const auto& rows) { return rows.body(row, extent); }, rows_);
+    }
+
+private:
+    using Rows = std::variant<BoxRows, HullRows, OneFrustum>;
+
+    template <class Array>
+    static Array as(const nb::handle& array) {
+        return nb::cast<Array>(array, false);
+    }
+
+    static Rows rows_of(const nb::tuple& arrays) {
+        if (arrays.size() == 2) {
+            return HullRows{as<Rows3>(arrays[0]), as<Offsets>(arrays[1])};
+        }
+        if (as<nb::ndarray<nb::ro>>(arrays[0]).ndim() == 1) {
+            return OneFrustum(as<Input<double, nb::shape<18>>>(arrays[0]), as<Rows3>(arrays[1]),
+                              as<Values>(arrays[2]));
+        }
+        return BoxRows{as<Rows3>(arrays[0]), as<Matrices3>(arrays[1]), as<Rows3>(arrays[2])};
+    }
+
+    Rows rows_;
+};
+
 /// Pairs of two batches of which one may have a single item.
-template <class A, class B>
-std::size_t common_count(const A& a, const B& b) {
-    const std::size_t n = a.count() == 1 ? b.count() : a.count();
-    if ((b.count() != n && b.count() != 1) || !a.consistent() || !b.consistent()) {
-        throw nb::value_error("distance: arrays of different length");
+std::size_t common_count(std::size_t a, std::size_t b) {
+    const std::size_t n = a == 1 ? b : a;
+    if (b != n && b != 1) {
+        throw nb::value_error("distance: batches of different length");
     }
     return n;
 }
 
 template <class Sink>
-nb::tuple distance_boxes(const Rows3& center_a, const Matrices3& axes_a, const Rows3& half_extents_a,
-                         const Rows3& center_b, const Matrices3& axes_b, const Rows3& half_extents_b,
-                         bool penetration) {
-    const BoxRows a{center_a, axes_a, half_extents_a};
-    const BoxRows b{center_b, axes_b, half_extents_b};
-    const std::size_t n = common_count(a, b);
-    const Sink out(n);
-    {
-        const nb::gil_scoped_release unlocked;
-        for (std::size_t i = 0; i < n; ++i) {
-            out.set(i, world_distance(a.body(i), b.body(i), penetration, nullptr));
-        }
-    }
-    return out.tuple();
-}
-
-template <class Sink>
-nb::tuple distance_boxes_polytopes(const Rows3& center_a, const Matrices3& axes_a,
-                                   const Rows3& half_extents_a, const Rows3& vertices_b,
-                                   const Offsets& offsets_b, const Rows3& origin_b, const Values& error_b,
-                                   bool penetration) {
-    const BoxRows a{center_a, axes_a, half_extents_a};
-    const HullRows b{vertices_b, offsets_b, origin_b, error_b};
-    const std::size_t n = common_count(a, b);
-    const Sink out(n);
-    {
-        const nb::gil_scoped_release unlocked;
-        std::vector<double> scratch(b.scratch_size());
-        HullExtent extent;
-        for (std::size_t i = 0; i < n; ++i) {
-            out.set(i, world_distance(a.body(i), b.body(i, extent), penetration, scratch.data()));
-        }
-    }
-    return out.tuple();
-}
-
-template <class Sink>
-nb::tuple distance_polytopes(const Rows3& vertices_a, const Offsets& offsets_a, const Rows3& origin_a,
-                             const Values& error_a, const Rows3& vertices_b, const Offsets& offsets_b,
-                             const Rows3& origin_b, const Values& error_b, bool penetration) {
-    const HullRows a{vertices_a, offsets_a, origin_a, error_a};
-    const HullRows b{vertices_b, offsets_b, origin_b, error_b};
-    const std::size_t n = common_count(a, b);
-    const Sink out(n);
+nb::tuple distance_world(const nb::tuple& side_a, const nb::tuple& side_b, bool penetration,
+                         std::string_view accuracy, bool evidence) {
+    const WorldSide a(side_a);
+    const WorldSide b(side_b);
+    const std::size_t n = common_count(a.count(), b.count());
+    const Sink out(n, evidence);
+    const Wanted wanted{penetration, tier_of(accuracy), evidence};
     {
         const nb::gil_scoped_release unlocked;
         std::vector<double> scratch(a.scratch_size() + b.scratch_size());
         HullExtent extent_a;
         HullExtent extent_b;
         for (std::size_t i = 0; i < n; ++i) {
-            out.set(i, world_distance(a.body(i, extent_a), b.body(i, extent_b), penetration, scratch.data()));
+            out.set(i, world_distance(a.body(i, extent_a), b.body(i, extent_b), wanted, scratch.data()));
         }
     }
-    return out.tuple();
+    return out.everything();
 }
 
 /// Every query twice: its answers under its own name, and as `*_stages` which branch gave them.
@@ -309,27 +382,15 @@ void define_distance(nb::module_& m) {
     define(m, "distance_pairs", "distance_pairs_stages", distance_pairs<Answers>, distance_pairs<Stages>,
            nb::arg("kinds").noconvert(), nb::arg("params").noconvert(), nb::arg("vertices").noconvert(),
            nb::arg("offsets").noconvert(), nb::arg("pairs").noconvert(), nb::arg("poses_ab").noconvert(),
-           nb::arg("penetration"));
-    m.def("distance_placed", distance_placed<Answers>, nb::arg("kinds").noconvert(),
-          nb::arg("params").noconvert(), nb::arg("vertices").noconvert(), nb::arg("offsets").noconvert(),
-          nb::arg("reach").noconvert(), nb::arg("shape").noconvert(), nb::arg("poses").noconvert(),
-          nb::arg("uncertainty").noconvert(), nb::arg("pairs").noconvert(), nb::arg("pose_rounding"),
-          nb::arg("penetration"));
-    define(m, "distance_boxes", "distance_boxes_stages", distance_boxes<Answers>, distance_boxes<Stages>,
-           nb::arg("center_a").noconvert(), nb::arg("axes_a").noconvert(),
-           nb::arg("half_extents_a").noconvert(), nb::arg("center_b").noconvert(),
-           nb::arg("axes_b").noconvert(), nb::arg("half_extents_b").noconvert(), nb::arg("penetration"));
-    define(m, "distance_boxes_polytopes", "distance_boxes_polytopes_stages",
-           distance_boxes_polytopes<Answers>, distance_boxes_polytopes<Stages>,
-           nb::arg("center_a").noconvert(), nb::arg("axes_a").noconvert(),
-           nb::arg("half_extents_a").noconvert(), nb::arg("vertices_b").noconvert(),
-           nb::arg("offsets_b").noconvert(), nb::arg("origin_b").noconvert(), nb::arg("error_b").noconvert(),
-           nb::arg("penetration"));
-    define(m, "distance_polytopes", "distance_polytopes_stages", distance_polytopes<Answers>,
-           distance_polytopes<Stages>, nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
-           nb::arg("origin_a").noconvert(), nb::arg("error_a").noconvert(), nb::arg("vertices_b").noconvert(),
-           nb::arg("offsets_b").noconvert(), nb::arg("origin_b").noconvert(), nb::arg("error_b").noconvert(),
-           nb::arg("penetration"));
+           nb::arg("penetration"), nb::arg("accuracy") = "float64", nb::arg("evidence") = false,
+           nb::arg("frusta").noconvert() = nb::none());
+    m.def("distance_placed", distance_placed, nb::arg("kinds").noconvert(), nb::arg("params").noconvert(),
+          nb::arg("vertices").noconvert(), nb::arg("offsets").noconvert(), nb::arg("reach").noconvert(),
+          nb::arg("shape").noconvert(), nb::arg("poses").noconvert(), nb::arg("uncertainty").noconvert(),
+          nb::arg("pairs").noconvert(), nb::arg("pose_rounding"), nb::arg("penetration"));
+    define(m, "distance_world", "distance_world_stages", distance_world<Answers>, distance_world<Stages>,
+           nb::arg("a"), nb::arg("b"), nb::arg("penetration"), nb::arg("accuracy") = "float64",
+           nb::arg("evidence") = false);
 }
 
 }  // namespace geomsrv::bind

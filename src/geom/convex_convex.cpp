@@ -13,17 +13,12 @@ namespace geomsrv {
 
 namespace {
 
-/// From the middle of a to that of b, where they differ.
-Vec3 first_direction(const Core& a, const Core& b) {
-    const Vec3 d = b.center - a.center;
-    return d.x == 0.0 && d.y == 0.0 && d.z == 0.0 ? Vec3{1.0, 0.0, 0.0} : normalized(d);
-}
-
 CoreSeparation from_gjk(const Core& a, const Core& b, const Gjk& found, Stage stage) {
     CoreSeparation out = certify_apart(a, b, found.normal, found.point_a, found.point_b);
     out.stage = stage;
     out.iterations = found.iterations;
     out.witness = found.witness;
+    out.simplex = found.witness;
     return out;
 }
 
@@ -40,22 +35,7 @@ CoreSeparation sunk(const Core& a, const Core& b, const Gjk& found, Stage stage)
     return out;
 }
 
-/// Deepest points along a normal: where a and b, moved out along it until they touch, have their nearest
-/// points.
-Gjk points_along(const Core& a, const Core& b, Vec3 normal) {
-    const double gap = lowest(b, normal).value - highest(a, normal).value;
-    Core moved = b;
-    moved.center = b.center - gap * normal;
-    moved.reach = b.reach + std::abs(gap);
-    Gjk found = gjk(a, moved, normal);
-    if (found.state == GjkState::stalled) {
-        found = gjk_wide(a, moved, normal);
-    }
-    found.point_b = found.point_b + gap * normal;
-    return found;
-}
-
-CoreSeparation depth(const Core& a, const Core& b, const Gjk& start, Stage stage) {
+CoreSeparation measured_depth(const Core& a, const Core& b, const Gjk& start, Stage stage) {
     // What the points prove from above holds whether the bodies overlap or not.
     const double size = a.reach + b.reach;
     const double apart_at_most = start.length * (1.0 + kGapScale) + kMemberError * size;
@@ -77,7 +57,7 @@ CoreSeparation depth(const Core& a, const Core& b, const Gjk& start, Stage stage
         }
     }
 
-    const HullFacet facet =
+    const NearestFacet facet =
         nearest_facet(a, b, start.state == GjkState::enclosed ? start.witness : Witness{});
     if (facet.flat) {
         // The difference has no inside; the common point found is all there is.
@@ -101,7 +81,26 @@ CoreSeparation depth(const Core& a, const Core& b, const Gjk& start, Stage stage
     return out;
 }
 
+CoreSeparation depth(const Core& a, const Core& b, const Gjk& start, Stage stage) {
+    CoreSeparation out = measured_depth(a, b, start, stage);
+    out.simplex = start.witness;
+    return out;
+}
+
 }  // namespace
+
+Gjk points_along(const Core& a, const Core& b, Vec3 normal) {
+    const double gap = lowest(b, normal).value - highest(a, normal).value;
+    Core moved = b;
+    moved.center = b.center - gap * normal;
+    moved.reach = b.reach + std::abs(gap);
+    Gjk found = gjk(a, moved, normal);
+    if (found.state == GjkState::stalled) {
+        found = gjk_wide(a, moved, normal);
+    }
+    found.point_b = found.point_b + gap * normal;
+    return found;
+}
 
 CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
     Stage stage = Stage::gjk;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "geom/convex_convex.hpp"
+#include "geom/exact_convex.hpp"
 #include "geom/half_space_pairs.hpp"
 #include "geom/place.hpp"
 #include "geom/point_box.hpp"
@@ -89,11 +90,17 @@ void swap_bodies(CoreSeparation& s) {
     for (int i = 0; i < s.witness.count; ++i) {
         std::swap(s.witness.a[i], s.witness.b[i]);
     }
+    for (int i = 0; i < s.simplex.count; ++i) {
+        std::swap(s.simplex.a[i], s.simplex.b[i]);
+    }
 }
 
 /// Back to the caller's unit.  Only a result below the normal range rounds: then away from the value.
 void unscale(CoreSeparation& s, double scale) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    if (scale == 1.0) {
+        return;
+    }
     const double unit = 1.0 / scale;
     s.value *= unit;
     s.lower = std::nextafter(s.lower * unit, -kInfinity);
@@ -105,6 +112,14 @@ void unscale(CoreSeparation& s, double scale) {
 /// What the shape is larger than its core by [m].
 double radius_of(const ShapeView& shape) {
     return shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::capsule ? shape.params[0] : 0.0;
+}
+
+/// x - a - b for the bounds of a correctly rounded x; of the numbers as they are, so that nothing is lost.
+Rounding reduced_exactly(const CoreSeparation& core, double a, double b) {
+    const auto rounded = [&](double x) {
+        return rounded_quotient(Exact(x) - Exact(a) - Exact(b), Exact(1.0));
+    };
+    return {rounded(core.value).nearest, rounded(core.lower).lower, rounded(core.upper).upper};
 }
 
 /// The signed distance of the shapes from that of their cores.
@@ -119,6 +134,8 @@ Separation with_radii(const CoreSeparation& core, double radius_a, double radius
     out.stage = core.stage;
     out.iterations = core.iterations;
     out.witness = core.witness;
+    out.simplex = core.simplex;
+    out.rung = core.rung;
     const double radii = radius_a + radius_b;
     // Each of the sum and the difference rounds by u.
     const auto reduced = [&](double x, double direction) {
@@ -127,6 +144,12 @@ Separation with_radii(const CoreSeparation& core, double radius_a, double radius
     out.distance = core.value - radii;
     out.lower = reduced(core.lower, -1.0);
     out.upper = reduced(core.upper, 1.0);
+    if (core.stage == Stage::exact && radii > 0.0) {
+        const Rounding reduced_core = reduced_exactly(core, radius_a, radius_b);
+        out.distance = reduced_core.nearest;
+        out.lower = reduced_core.lower;
+        out.upper = reduced_core.upper;
+    }
     out.normal = core.normal;
     out.point_a = core.point_a + origin;
     out.point_b = core.point_b + origin;
@@ -146,6 +169,22 @@ Separation with_radii(const CoreSeparation& core, double radius_a, double radius
         out.upper = std::max(out.upper, 0.0);
     }
     return out;
+}
+
+/// A body in world coordinates, by its own numbers.
+ExactBody exact_body(const WorldBody& body) {
+    ExactBody out;
+    if (body.is_box) {
+        out.center = body.box.center;
+        out.generators = 3;
+        std::copy(std::begin(body.box.axes.row), std::end(body.box.axes.row), out.axis);
+        out.half[0] = body.box.half_extents.x;
+        out.half[1] = body.box.half_extents.y;
+        out.half[2] = body.box.half_extents.z;
+        return out;
+    }
+    static constexpr Transform kUnmoved;
+    return exact_body(body.hull, kUnmoved);
 }
 
 struct LocalPair {
@@ -169,17 +208,15 @@ double better_scale(LocalFrame frame, double size, Place place_both, Magnitude m
 }
 
 /// Places the pair, in a larger or smaller unit of length where its sizes leave the range of the kernels, and
-/// solves.
+/// solves; solve(pair, scale) answers in the caller's unit.
 template <class Place, class Magnitude, class Solve>
 CoreSeparation solve_in_range(LocalFrame frame, Place place_both, Magnitude magnitude, Solve solve) {
     const LocalPair pair = place_both(frame);
     if (in_range(pair.size())) {
-        return solve(pair);
+        return solve(pair, 1.0);
     }
     frame.scale = better_scale(frame, pair.size(), place_both, magnitude);
-    CoreSeparation out = solve(place_both(frame));
-    unscale(out, frame.scale);
-    return out;
+    return solve(place_both(frame), frame.scale);
 }
 
 /// Half spaces multiply lengths by unit vectors only: any unit will do in which nothing overflows.
@@ -202,7 +239,7 @@ CoreSeparation solve_unbounded(LocalFrame frame, Place place_both, Magnitude mag
 
 bool supported_pair(ShapeKind a, ShapeKind b) { return kernel_of(std::min(a, b), std::max(a, b)) != kUnsup; }
 
-Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, bool penetration,
+Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, const Wanted& wanted,
                           double* scratch) {
     const bool flip = a.kind > b.kind;
     const Kernel kernel = flip ? kernel_of(b.kind, a.kind) : kernel_of(a.kind, b.kind);
@@ -215,19 +252,34 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
         return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
     };
     const auto solve = [&](const LocalPair& pair) {
-        return flip ? kernel(pair.b, pair.a, penetration) : kernel(pair.a, pair.b, penetration);
+        return flip ? kernel(pair.b, pair.a, wanted.penetration) : kernel(pair.a, pair.b, wanted.penetration);
     };
     const auto magnitude = [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); };
     const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
+    if (wanted.tier == Tier::exact && kernel != kUnsup && !unbounded) {
+        const Transform X_a;
+        const ExactBody exact_a = exact_body(a, X_a);
+        const ExactBody exact_b = exact_body(b, X_ab);
+        const CoreSeparation core =
+            solve_in_range(frame, place_both, magnitude, [&](const LocalPair& pair, double scale) {
+                return exact_convex_convex({exact_a, pair.a.core}, {exact_b, pair.b.core}, scale, wanted);
+            });
+        return with_radii(core, radius_of(a), radius_of(b), frame.origin, wanted.penetration);
+    }
+    const auto solve_scaled = [&](const LocalPair& pair, double scale) {
+        CoreSeparation core = solve(pair);
+        unscale(core, scale);
+        return core;
+    };
     CoreSeparation core = unbounded ? solve_unbounded(frame, place_both, magnitude, solve)
-                                    : solve_in_range(frame, place_both, magnitude, solve);
+                                    : solve_in_range(frame, place_both, magnitude, solve_scaled);
     if (flip) {
         swap_bodies(core);
     }
-    return with_radii(core, radius_of(a), radius_of(b), frame.origin, penetration);
+    return with_radii(core, radius_of(a), radius_of(b), frame.origin, wanted.penetration);
 }
 
-Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetration, double* scratch) {
+Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& wanted, double* scratch) {
     const auto pose = [](const WorldBody& body) { return Transform{{}, body.origin}; };
     const auto placed = [&](const WorldBody& body, const LocalFrame& f, double* memory) {
         return body.is_box ? Placed{place_box(body.box.center, body.box.axes, body.box.half_extents, f), {}}
@@ -239,6 +291,8 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetrati
     };
     LocalFrame frame;
     frame.origin = a.is_box ? a.box.center : a.origin + middle_of(a.hull);
+    const ExactBody exact_a = exact_body(a);
+    const ExactBody exact_b = exact_body(b);
     const CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
@@ -246,8 +300,15 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetrati
                              placed(b, f, scratch + (a.is_box ? 0 : 3 * a.hull.count))};
         },
         [&] { return std::max(magnitude(a), magnitude(b)); },
-        [&](const LocalPair& pair) { return convex_convex(pair.a.core, pair.b.core, penetration); });
-    return with_radii(core, 0.0, 0.0, frame.origin, penetration);
+        [&](const LocalPair& pair, double scale) {
+            if (wanted.tier == Tier::exact) {
+                return exact_convex_convex({exact_a, pair.a.core}, {exact_b, pair.b.core}, scale, wanted);
+            }
+            CoreSeparation out = convex_convex(pair.a.core, pair.b.core, wanted.penetration);
+            unscale(out, scale);
+            return out;
+        });
+    return with_radii(core, 0.0, 0.0, frame.origin, wanted.penetration);
 }
 
 }  // namespace geomsrv

@@ -17,8 +17,11 @@ constexpr std::size_t scratch_size(const ShapeView& a, const ShapeView& b) {
 }
 
 /// Results in the frame of a; X_ab is the pose of b in a.  Overlapping shapes have distance 0, or minus their
-/// depth with `penetration`.  Unsupported pairs answer NaN.
-Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, bool penetration,
+/// depth where `wanted`.  Unsupported pairs answer NaN.
+///
+/// Tier exact rounds correctly for polytopes.  Of spheres and capsules the core is exact and the radii are
+/// taken off outwards; half spaces are answered as at float64, to which their normals are rounded.
+Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, const Wanted& wanted,
                           double* scratch);
 
 /// A box by its centre, the rows A_i of `axes` and half sizes: the hull of center +- half_extents[i] * A_i.
@@ -33,11 +36,11 @@ struct WorldBody {
     bool is_box = false;
     BoxView box;
     ShapeView hull;  ///< of kind convex, unless it is a box
-    Vec3 origin;     ///< what the hull's vertices are relative to
+    Vec3 origin;     ///< what the hull's vertices are relative to, a frustum's corners to its apex
 };
 
 /// Results in world coordinates; everything is computed relative to a, so nothing is lost far from the
 /// origin.
-Separation world_distance(const WorldBody& a, const WorldBody& b, bool penetration, double* scratch);
+Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& wanted, double* scratch);
 
 }  // namespace geomsrv

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "geom/double_double.hpp"
 #include "geom/exact_number.hpp"
 #include "geom/rounding.hpp"
+#include "geom/rung.hpp"
 
 namespace geomsrv {
 
@@ -26,8 +28,17 @@ struct Enclosed {
 // Rounding of the error bounds themselves: fewer than 16 roundings each, all of positive numbers.
 inline constexpr double kBoundRounding = 1.0 + 16 * kUnitRoundoff;
 
-// Parts of a product that leave the normal range lose at most a few 2^-1074 each.
+// Parts of a product that leave the normal range lose at most a few 2^-1074 each.  Above the second constant
+// none does: the lowest bit of a product of doubles is 2^-106 of it.
 inline constexpr double kEnclosedUnderflow = 0x1p-1060;
+inline constexpr double kNoUnderflow = 0x1p-960;
+
+/// Known to be zero.
+inline bool is_zero(const Enclosed& x) { return x.value.hi == 0.0 && x.error == 0.0; }
+
+// The same with room to spare, for products of more than two.
+inline constexpr double kWholeProduct = 0x1p-900;
+inline constexpr double kSurelyNormal = kWholeProduct;
 
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
@@ -35,6 +46,12 @@ inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
     // Two doubles whose sum is found without rest: nothing is rounded.
     if (a.value.lo == 0.0 && b.value.lo == 0.0) {
         return {sum, (a.error + b.error) * kBoundRounding};
+    }
+    if (is_zero(a)) {
+        return b;
+    }
+    if (is_zero(b)) {
+        return a;
     }
     const double larger = std::max(std::fabs(a.value.hi), std::fabs(b.value.hi));
     return {sum, ((a.error + b.error) + kWideRoundoff * larger) * kBoundRounding};
@@ -44,13 +61,22 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble product = a.value * b.value;
     const double size_a = std::fabs(a.value.hi);
     const double size_b = std::fabs(b.value.hi);
+    // Of two doubles the product is found without rest, unless it is so small that parts of it underflow.
     const bool exact = a.value.lo == 0.0 && b.value.lo == 0.0;
     const double rounding = exact ? 0.0 : kWideRoundoff * std::fabs(product.hi);
-    const bool zero = (size_a == 0.0 && a.error == 0.0) || (size_b == 0.0 && b.error == 0.0);
+    const bool whole = is_zero(a) || is_zero(b) || (exact && std::fabs(product.hi) > kNoUnderflow);
     return {product,
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
-                (zero ? 0.0 : kEnclosedUnderflow)};
+                (whole ? 0.0 : kEnclosedUnderflow)};
 }
+
+/// 2 a, which rounds nothing.
+inline Enclosed twice(const Enclosed& a) { return {{2.0 * a.value.hi, 2.0 * a.value.lo}, 2.0 * a.error}; }
+inline Exact twice(const Exact& a) { return a + a; }
+
+/// |a|, off by no more than a.
+inline Enclosed magnitude(const Enclosed& a) { return a.value.hi < 0.0 ? -a : a; }
+inline Exact magnitude(const Exact& a) { return a.magnitude(); }
 
 /// What `sign_of` answers where the error does not let it decide.
 inline constexpr int kUncertain = 2;
@@ -63,7 +89,7 @@ inline int sign_of(const Enclosed& x) {
     if (size > x.error * kBoundRounding && size < std::numeric_limits<double>::infinity()) {
         return x.value.hi > 0.0 ? 1 : -1;
     }
-    return size == 0.0 && x.error == 0.0 ? 0 : kUncertain;
+    return is_zero(x) ? 0 : kUncertain;
 }
 inline int sign_of(const Exact& x) { return x.sign(); }
 

@@ -8,6 +8,7 @@
 // (l1).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "geom/enclosed.hpp"
@@ -56,7 +57,7 @@ struct ExactBody {
     enum class Kind : std::uint8_t {
         zonotope,  ///< center + all sums of +-half[i] * axis[i]: point, segment, box
         hull,      ///< of rotation * listed point + center
-        frustum,
+        frustum,   ///< rotation * corner of `frustum` + center
     };
     Kind kind = Kind::zonotope;
     Vec3 center;
@@ -75,51 +76,97 @@ struct ExactBody {
     /// What every vertex is multiplied by, to be free of divisions: near depth of a frustum, which has far
     /// corners at far / near; 1 for the others.
     [[nodiscard]] double denominator() const { return kind == Kind::frustum ? frustum->near : 1.0; }
+
+    /// A point near the vertices, given literally: two bodies far from the origin are compared from there.
+    [[nodiscard]] Vec3 anchor() const { return starts_at_apex() ? frustum->origin : center; }
+
+    /// A frustum that is where its own numbers say.
+    [[nodiscard]] bool starts_at_apex() const {
+        return kind == Kind::frustum && rotation == nullptr && center.x == 0.0 && center.y == 0.0 &&
+               center.z == 0.0;
+    }
 };
 
-namespace detail {
-
+/// factor * a, at no cost for the usual factor 1.
 template <class N>
-VectorOf<N> frustum_corner(const Frustum& f, int corner) {
-    const N left((corner & 1) != 0 ? f.l1 : f.l0);
-    const N up((corner & 2) != 0 ? f.u1 : f.u0);
-    const N near(f.near);
-    const N reach((corner & 4) != 0 ? f.far : f.near);
-    // E + far / near * (l L + u U + n D), times n; on the near plane the same with near / near.
-    const VectorOf<N> ray =
-        left * exactly<N>(f.axes.row[0]) + up * exactly<N>(f.axes.row[1]) + near * exactly<N>(f.axes.row[2]);
-    return near * exactly<N>(f.origin) + reach * ray;
+VectorOf<N> scaled(double factor, const VectorOf<N>& a) {
+    return factor == 1.0 ? a : N(factor) * a;
 }
 
-}  // namespace detail
-
-/// A vertex times the body's denominator.
 template <class N>
-VectorOf<N> vertex_times_denominator(const ExactBody& body, int vertex) {
+VectorOf<N> rotated(const Mat3* rotation, const VectorOf<N>& a) {
+    if (rotation == nullptr) {
+        return a;
+    }
+    return {dot(exactly<N>(rotation->row[0]), a), dot(exactly<N>(rotation->row[1]), a),
+            dot(exactly<N>(rotation->row[2]), a)};
+}
+
+/// Half an edge of a zonotope.
+template <class N>
+VectorOf<N> generator_of(const ExactBody& body, int i) {
+    return N(body.half[i]) * exactly<N>(body.axis[i]);
+}
+
+/// A vertex minus the body's anchor, times its denominator.
+template <class N>
+VectorOf<N> arm_times_denominator(const ExactBody& body, int vertex) {
     switch (body.kind) {
         case ExactBody::Kind::zonotope: {
-            VectorOf<N> v = exactly<N>(body.center);
-            for (int i = 0; i < body.generators; ++i) {
-                const double half = (vertex >> i & 1) != 0 ? body.half[i] : -body.half[i];
-                v = v + N(half) * exactly<N>(body.axis[i]);
+            const auto turned = [&](int i) {
+                const VectorOf<N> g = generator_of<N>(body, i);
+                return (vertex >> i & 1) != 0 ? g : -g;
+            };
+            VectorOf<N> v = body.generators > 0 ? turned(0) : exactly<N>({});
+            for (int i = 1; i < body.generators; ++i) {
+                v = v + turned(i);
             }
             return v;
         }
         case ExactBody::Kind::hull: {
             const double* p = body.points + 3 * static_cast<std::ptrdiff_t>(vertex);
-            const VectorOf<N> listed = exactly<N>({p[0], p[1], p[2]});
-            if (body.rotation == nullptr) {
-                return listed + exactly<N>(body.center);
-            }
-            const Mat3& r = *body.rotation;
-            return VectorOf<N>{dot(exactly<N>(r.row[0]), listed), dot(exactly<N>(r.row[1]), listed),
-                               dot(exactly<N>(r.row[2]), listed)} +
-                   exactly<N>(body.center);
+            return rotated(body.rotation, exactly<N>({p[0], p[1], p[2]}));
         }
         case ExactBody::Kind::frustum:
             break;
     }
-    return detail::frustum_corner<N>(*body.frustum, vertex);
+    const Frustum& f = *body.frustum;
+    const N left((vertex & 1) != 0 ? f.l1 : f.l0);
+    const N up((vertex & 2) != 0 ? f.u1 : f.u0);
+    // s (l L + u U + n D) from the apex, s = far / near or near / near; times n.
+    const VectorOf<N> ray = N((vertex & 4) != 0 ? f.far : f.near) *
+                            (left * exactly<N>(f.axes.row[0]) + up * exactly<N>(f.axes.row[1]) +
+                             N(f.near) * exactly<N>(f.axes.row[2]));
+    return body.starts_at_apex() ? ray : rotated(body.rotation, ray + N(f.near) * exactly<N>(f.origin));
+}
+
+/// A vertex times the body's denominator.
+template <class N>
+VectorOf<N> vertex_times_denominator(const ExactBody& body, int vertex) {
+    return scaled(body.denominator(), exactly<N>(body.anchor())) + arm_times_denominator<N>(body, vertex);
+}
+
+/// From one vertex to another, times the body's denominator; what they have in common is left out.
+template <class N>
+VectorOf<N> step_times_denominator(const ExactBody& body, int from, int to) {
+    if (body.kind == ExactBody::Kind::zonotope) {
+        VectorOf<N> step = exactly<N>({});
+        for (int i = 0; i < body.generators; ++i) {
+            if ((from >> i & 1) == (to >> i & 1)) {
+                continue;
+            }
+            const VectorOf<N> g = generator_of<N>(body, i);
+            const VectorOf<N> edge = {twice(g.x), twice(g.y), twice(g.z)};
+            step = (to >> i & 1) != 0 ? step + edge : step - edge;
+        }
+        return step;
+    }
+    if (body.kind == ExactBody::Kind::hull) {
+        const double* p = body.points + 3 * static_cast<std::ptrdiff_t>(from);
+        const double* q = body.points + 3 * static_cast<std::ptrdiff_t>(to);
+        return rotated(body.rotation, exactly<N>({q[0], q[1], q[2]}) - exactly<N>({p[0], p[1], p[2]}));
+    }
+    return arm_times_denominator<N>(body, to) - arm_times_denominator<N>(body, from);
 }
 
 }  // namespace geomsrv

@@ -5,28 +5,13 @@
 // A float64 search (gjk.hpp) guesses the features that are nearest: a simplex of K = {q - p : p in a, q in
 // b}. Here the guess is checked, and mended where it is wrong, by the same steps without rounding: v, the
 // point of the simplex nearest to the origin, is nearest in all of K iff no vertex of K lies below it along
-// v.  Each step is taken in Enclosed arithmetic and, where that leaves a sign or the rounding of the result
-// open, once more in Exact.  In exact arithmetic every step shortens v, so the search ends.
+// v.  Each sign is found in Enclosed arithmetic and, where that leaves it open, in Exact.  Every step
+// shortens v, so the search ends.
 #pragma once
 
-#include "geom/core.hpp"
-#include "geom/enclosed.hpp"
-#include "geom/exact_body.hpp"
-#include "geom/separation.hpp"
+#include "geom/exact_feature.hpp"
 
 namespace geomsrv {
-
-/// A body twice: by the caller's numbers, and rounded, for filters.
-struct ExactAndRough {
-    const ExactBody& exact;
-    const Core& rough;  ///< the same vertices in the same order, relative to any origin, in any unit
-};
-
-enum class Rung : std::uint8_t {
-    filter,  ///< float64 was proven right as it was
-    wide,    ///< double-double with error bounds
-    exact,
-};
 
 struct ExactSeparation {
     bool meet = false;  ///< the closed bodies have a common point

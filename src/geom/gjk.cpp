@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geom/gjk.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
@@ -89,17 +90,18 @@ public:
     /// Nearest point of the whole simplex; count 4 and weights of all its vertices where it holds the origin.
     struct Answer {
         bool enclosed = false;
+        double margin = std::numeric_limits<double>::infinity();
         T inside[4] = {};
         Nearest<T> nearest;
     };
     Answer solve() const {
         switch (simplex_.count) {
             case 1:
-                return {false, {}, point(0)};
+                return from(point(0));
             case 2:
-                return {false, {}, edge(0, 1)};
+                return from(edge(0, 1));
             case 3:
-                return {false, {}, face(0, 1, 2)};
+                return from(face(0, 1, 2));
             default:
                 return solid();
         }
@@ -107,6 +109,12 @@ public:
 
 private:
     Vec w(int i) const { return simplex_.vertex[i].w; }
+
+    static Answer from(const Nearest<T>& nearest) {
+        Answer out;
+        out.nearest = nearest;
+        return out;
+    }
 
     Nearest<T> point(int i) const {
         Nearest<T> out;
@@ -195,9 +203,10 @@ private:
             const Vec n = cross(w(f[1]) - w(f[0]), w(f[2]) - w(f[0]));
             const T opposite = dot(n, w(f[3]) - w(f[0]));
             const T origin = -dot(n, w(f[0]));
-            const bool inside = (origin > T{0.0}) == (opposite > T{0.0}) &&
-                                Number::absolute(origin) > doubt && Number::absolute(opposite) > doubt;
+            const double margin = std::min(Number::absolute(origin), Number::absolute(opposite)) - doubt;
+            const bool inside = (origin > T{0.0}) == (opposite > T{0.0}) && margin > 0.0;
             if (inside) {
+                out.margin = std::min(out.margin, margin);
                 out.inside[f[3]] = origin / opposite;
                 continue;
             }
@@ -332,6 +341,7 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
                 simplex.weight[i] = answer.inside[i];
             }
             set_points(out, simplex);
+            out.margin = answer.margin;
             out.state = GjkState::enclosed;
             return out;
         }
@@ -356,6 +366,11 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
 }
 
 }  // namespace
+
+Vec3 first_direction(const Core& a, const Core& b) {
+    const Vec3 d = b.center - a.center;
+    return d.x == 0.0 && d.y == 0.0 && d.z == 0.0 ? Vec3{1.0, 0.0, 0.0} : normalized(d);
+}
 
 Gjk gjk(const Core& a, const Core& b, Vec3 start) { return run<double>(a, b, start); }
 

@@ -26,8 +26,12 @@ struct Gjk {
     Vec3 point_a;  ///< witness points of the two cores; a common point if enclosed
     Vec3 point_b;
     Witness witness;
+    double margin = 0.0;  ///< if enclosed: smallest of the determinants that say so, less their rounding
     int iterations = 0;
 };
+
+/// From the middle of a to that of b, where they differ.
+Vec3 first_direction(const Core& a, const Core& b);
 
 /// In double arithmetic, from the direction `start` (unit).
 Gjk gjk(const Core& a, const Core& b, Vec3 start);

@@ -22,7 +22,7 @@
 
 namespace geomsrv {
 
-struct HullFacet {
+struct NearestFacet {
     bool flat = false;   ///< K is thinner than rounding along `normal`
     Vec3 normal;         ///< unit, from a to b: largest gap found
     double upper = 0.0;  ///< >= signed distance if < 0; otherwise nothing is proven from above
@@ -34,6 +34,6 @@ struct HullFacet {
 };
 
 /// Facet of K nearest to the origin; `seed` are vertices of K to start from, best if they hold the origin.
-HullFacet nearest_facet(const Core& a, const Core& b, const Witness& seed);
+NearestFacet nearest_facet(const Core& a, const Core& b, const Witness& seed);
 
 }  // namespace geomsrv

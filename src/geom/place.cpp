@@ -258,4 +258,27 @@ Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFram
     return core;
 }
 
+ExactBody exact_body(const ShapeView& shape, const Transform& X_ls) {
+    ExactBody out;
+    out.center = X_ls.translation;
+    out.rotation = is_identity(X_ls.rotation) ? nullptr : &X_ls.rotation;
+    if (shape.kind == ShapeKind::convex) {
+        out.kind = shape.frustum != nullptr ? ExactBody::Kind::frustum : ExactBody::Kind::hull;
+        out.frustum = shape.frustum;
+        out.points = shape.vertices;
+        out.listed = static_cast<int>(shape.count);
+    } else if (shape.kind == ShapeKind::box) {
+        out.generators = 3;
+        for (int i = 0; i < 3; ++i) {
+            out.axis[i] = column(X_ls.rotation, i);
+            out.half[i] = shape.params[i];
+        }
+    } else if (shape.kind == ShapeKind::capsule) {
+        out.generators = 1;
+        out.axis[0] = column(X_ls.rotation, 2);
+        out.half[0] = shape.params[1];
+    }
+    return out;
+}
+
 }  // namespace geomsrv

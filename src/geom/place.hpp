@@ -5,6 +5,7 @@
 #pragma once
 
 #include "geom/core.hpp"
+#include "geom/exact_body.hpp"
 #include "geom/half_space_pairs.hpp"
 #include "geom/shape.hpp"
 
@@ -37,6 +38,9 @@ Placed place(const ShapeView& shape, const Transform& X_ls, const LocalFrame& fr
 
 /// Box center +- half_extents[i] * axes[i]; the rows of `axes` are taken literally.
 Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFrame& frame);
+
+/// The shape by its own numbers; `X_ls` must outlive it.  Not for half spaces.
+ExactBody exact_body(const ShapeView& shape, const Transform& X_ls);
 
 /// Largest coordinate by size.
 double largest_of(Vec3 v);

@@ -76,7 +76,7 @@ Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double po
                            double* scratch) {
     const Transform X_a = pose_of(a.pose);
     const Transform X_ab = relative_pose(a.pose, X_a.rotation, b.pose);
-    Separation s = shape_distance(a.shape, b.shape, X_ab, penetration, scratch);
+    Separation s = shape_distance(a.shape, b.shape, X_ab, {penetration}, scratch);
     if (s.outcome == Outcome::unsupported) {
         return s;
     }

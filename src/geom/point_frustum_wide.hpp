@@ -17,6 +17,7 @@
 
 #include <cmath>
 
+#include "geom/lane_arithmetic.hpp"
 #include "geom/point_frustum.hpp"
 
 namespace geomsrv {

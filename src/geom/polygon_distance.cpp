@@ -358,6 +358,7 @@ PolygonDistance PolygonDistanceSolver::solve(Ring a, Ring b, bool penetration) {
     }
     if (decision.relation == Relation::overlapping) {
         PolygonDistance result = deepest_points(pair_, widest.lower);
+        result.meet = true;
         if (penetration) {
             return result;
         }
@@ -370,10 +371,12 @@ PolygonDistance PolygonDistanceSolver::solve(Ring a, Ring b, bool penetration) {
                 result.point_a = result.point_a + share * corner;
             }
         }
-        return {0.0, 0.0, 0.0, result.point_a, result.point_a, result.normal};
+        return {0.0, 0.0, 0.0, result.point_a, result.point_a, result.normal, true};
     }
     const AxisOf axis = decision.touching_axis;
-    return with_points({}, axis, facing_points(pair_, axis, pair_.lowest(axis)),
+    PolygonDistance result;
+    result.meet = true;
+    return with_points(result, axis, facing_points(pair_, axis, pair_.lowest(axis)),
                        pair_.side(axis.side).axis(axis.index));
 }
 

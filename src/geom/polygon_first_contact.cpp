@@ -242,6 +242,19 @@ GEOMSRV_WIDE_CLONES CandidateBits candidate_bits(const PairedPolygon& p, std::si
     return {joined(entries), joined(exits)};
 }
 
+/// Whether the polygons as given are certainly in contact at that time: no axis can be open then.  (Slacks for
+/// rounding of the input, which are not needed here, are more than what this comparison rounds.)
+GEOMSRV_WIDE_CLONES bool are_in_contact(const PolygonPair& pair, double time) {
+    LaneMask closed = Lanes(0.0) <= Lanes(0.0);
+    for (const int i : {0, 1}) {
+        const PairedPolygon& p = pair.side(i);
+        for (std::size_t k = 0; k < p.axes; k += kLanes) {
+            closed = closed & (Lanes::load(p.work[0] + k) <= Lanes(time) * Lanes::load(p.work[1] + k));
+        }
+    }
+    return all(closed);
+}
+
 /// How many axes `candidates_of` has listed.
 struct Candidates {
     std::size_t entries = 0;
@@ -538,14 +551,17 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     const Motion motion = relative_motion(a.velocity, b.velocity);
     const Slacks slacks(pair_, motion);
     const Window window = window_of(pair_, motion, slacks);
+    FirstContact never = kNever;
+    never.certain = true;
     if (window.never || window.enter > window.leave) {
-        return kNever;
+        return never;
     }
     // Times are in units of scaled length over scaled speed.  One later than the largest double counts as
     // never.
     const Seconds seconds{motion.scale_exponent - pair_.scale_exponent()};
     if (!(seconds.nearest(window.enter) <= std::min(t_max, kLargest))) {
-        return kNever;
+        never.certain = seconds.nearest(window.enter) > t_max;
+        return never;
     }
 
     const Candidates candidates = candidates_of(pair_, window, entries_.data(), exits_.data());
@@ -570,6 +586,10 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     result.time_upper =
         std::max(std::min(seconds.up(std::min(entry.upper, window.leave)), t_max), result.time);
     result.last_time = std::max(std::min(seconds.nearest(exit), t_max), result.time);
+    result.certain = window.apart
+                         ? are_in_contact(pair_, std::min(0.5 * (moment + exit),
+                                                          next_down(seconds.inverse(t_max))))
+                         : window.deep;
     result.normal = {kNaN, kNaN};
     if (result.status != ContactStatus::overlapping) {
         if (result.status == ContactStatus::touching) {

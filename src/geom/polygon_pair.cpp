@@ -327,7 +327,7 @@ bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
         if (n > 2 && !placed[i].strict && !known_strict) {
             return false;
         }
-        if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0) {
+        if (n == 2 && p.dx[0] == 0.0 && p.dy[0] == 0.0 && !known_strict) {
             return false;
         }
         if ((placed[i].has_tips || n == 2) && !append_tips(p)) {

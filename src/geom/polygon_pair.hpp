@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "geom/double_double.hpp"
+#include "geom/enclosed.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/polygon.hpp"
 #include "geom/vec.hpp"
@@ -83,12 +84,6 @@ struct ExactVec2 {
     DoubleDouble x, y;
 };
 
-/// A number and how far the exact one may be from it.
-struct Enclosed {
-    DoubleDouble value;
-    double error = 0.0;
-};
-
 /// Error of a dot product of exact vectors relative to the sum over its terms, in units of 2^-106: 7 for a
 /// product (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic building blocks of
 /// double-word arithmetic", 2017), 3 for a sum that takes no care of cancellation; the rest covers the bound.
@@ -122,9 +117,13 @@ struct Slack {
     double limit = 0.0;
 };
 
-/// Unit vector, whatever the length of v; v is not zero.
+/// Unit vector, whatever the length of v; zero for zero, which an edge may be that is far smaller than the
+/// pair.
 inline Vec2 unit(Vec2 v) {
     const double largest = std::max(std::fabs(v.x), std::fabs(v.y));
+    if (largest == 0.0) {
+        return {};
+    }
     const Vec2 reduced{v.x / largest, v.y / largest};
     return (1.0 / norm(reduced)) * reduced;
 }

@@ -16,6 +16,7 @@
 #include <limits>
 
 #include "geom/core.hpp"
+#include "geom/rung.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -34,6 +35,16 @@ enum class Stage : std::uint8_t {
     gjk_wide,    ///< GJK in double-double arithmetic
     facet_axes,  ///< all facet normals of a difference of zonotopes
     hull,        ///< growing the hull of the difference
+    exact,       ///< by the caller's numbers, see Rung
+};
+
+/// What the caller pays for; geomsrv._validate.ACCURACIES in the same order.
+enum class Tier : std::uint8_t { bound, float32, float64, exact };
+
+struct Wanted {
+    bool penetration = false;  ///< how deep overlapping bodies are, not only that they meet
+    Tier tier = Tier::float64;
+    bool simplex = false;  ///< the proof of the answer, even where another one is cheaper
 };
 
 /// Faces whose points the nearest points are combined from: point_a = sum of weight[i] * vertex a[i].
@@ -57,6 +68,9 @@ struct CoreSeparation {
     bool converged = false;  ///< lower and upper estimate have met; if not, a stronger method may do better
     int iterations = 0;
     Witness witness;
+    Witness
+        simplex;  ///< of vertices of the difference, its point nearest to the origin; all the proof there is
+    Rung rung = Rung::filter;
 };
 
 /// Signed distance of two shapes in the frame of the first (or of the world).
@@ -71,6 +85,8 @@ struct Separation {
     Stage stage = Stage::none;
     int iterations = 0;
     Witness witness;
+    Witness simplex;  ///< of the cores, see CoreSeparation
+    Rung rung = Rung::filter;
 };
 
 // ---- Proofs.  Sizes below are S = reach of a + reach of b. ----

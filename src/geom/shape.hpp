@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "geom/frustum.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -42,6 +43,7 @@ struct ShapeView {
     const double* vertices = nullptr;  ///< 3 * count coordinates of a convex shape [m]
     std::ptrdiff_t count = 0;
     const HullExtent* extent = nullptr;  ///< of a convex shape, if the caller knows it; see extent_of
+    const Frustum* frustum = nullptr;    ///< of which `vertices` are the eight corners, rounded
 };
 
 /// Rotation of the unit quaternion x y z w, rounded exactly as geomsrv._validate.rotation_matrices rounds it:
