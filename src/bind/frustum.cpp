@@ -10,6 +10,7 @@
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
+#include "bind/views.hpp"
 #include "geom/cull_evidence.hpp"
 #include "geom/frustum_box.hpp"
 #include "geom/point_frustum.hpp"
@@ -17,9 +18,6 @@
 namespace geomsrv::bind {
 
 namespace {
-
-using PackedFrustum = Input<double, nb::shape<18>>;
-using PackedFrustum2D = Input<double, nb::shape<10>>;
 
 Frustum unpack(const double* p) {
     return {.origin = {p[0], p[1], p[2]},
@@ -47,17 +45,6 @@ struct BoxRows {
         const double* const a = axes + 9 * i;
         return {
             center_of(i), {{{a[0], a[1], a[2]}, {a[3], a[4], a[5]}, {a[6], a[7], a[8]}}}, half_extents_of(i)};
-    }
-};
-
-/// Four rows of an array, coordinate by coordinate.
-template <std::size_t Dimension>
-struct FourRows {
-    Lanes at[Dimension];
-    GEOMSRV_INLINE explicit FourRows(const double* p) {
-        for (std::size_t k = 0; k < Dimension; ++k) {
-            at[k] = Lanes(Lanes::Vector{p[k], p[k + Dimension], p[k + 2 * Dimension], p[k + 3 * Dimension]});
-        }
     }
 };
 
@@ -217,25 +204,6 @@ GEOMSRV_WIDE_CLONES void find_evidence(const Frustum& frustum, BoxRows boxes, st
 }
 
 // ---------------------------------------------------------------------------------------------- points
-
-template <int Sides>
-View<Sides> unpack_view(const double* p) {
-    constexpr int kDimension = Sides + 1;
-    View<Sides> view;
-    std::copy_n(p, kDimension, view.origin);
-    p += kDimension;
-    for (auto& row : view.axes.row) {
-        std::copy_n(p, kDimension, row);
-        p += kDimension;
-    }
-    for (int i = 0; i < Sides; ++i) {
-        view.low[i] = *p++;
-        view.high[i] = *p++;
-    }
-    view.near = p[0];
-    view.far = p[1];
-    return view;
-}
 
 /// Where answers go; `nearest` is null if it was not asked for.
 struct PointAnswers {

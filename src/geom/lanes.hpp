@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -144,6 +145,32 @@ GEOMSRV_INLINE Real lesser(const Real& a, const Real& b) {
 template <class Real>
 GEOMSRV_INLINE Real greater(const Real& a, const Real& b) {
     return select(b < a, a, b);
+}
+
+GEOMSRV_INLINE void store(const LaneMask& mask, std::int64_t* to) {
+    Lanes((Lanes::Vector)mask.v).store(reinterpret_cast<double*>(to));
+}
+GEOMSRV_INLINE LaneMask load_mask(const std::int64_t* from) {
+    return LaneMask((LaneMask::Vector)Lanes::load(reinterpret_cast<const double*>(from)).v);
+}
+
+/// x where the condition holds, else 0.
+GEOMSRV_INLINE Lanes kept(const LaneMask& condition, const Lanes& x) {
+    return Lanes((Lanes::Vector)(condition.v & (LaneMask::Vector)x.v));
+}
+/// x with its sign changed where s is negative.
+GEOMSRV_INLINE Lanes with_sign_of(const Lanes& s, const Lanes& x) {
+    constexpr std::int64_t kSign = std::numeric_limits<std::int64_t>::min();
+    return Lanes((Lanes::Vector)(((LaneMask::Vector)s.v & kSign) ^ (LaneMask::Vector)x.v));
+}
+/// The greatest power of two that is not above x, for normal x > 0.
+GEOMSRV_INLINE Lanes power_of_two_in(const Lanes& x) {
+    constexpr std::int64_t kExponent = 0x7ff0000000000000;
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v & kExponent));
+}
+/// The `steps`-th next double, for normal x > 0.
+GEOMSRV_INLINE Lanes neighbour(const Lanes& x, const LaneMask::Vector& steps) {
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v + steps));
 }
 
 GEOMSRV_INLINE double least(const Lanes& a) { return lesser(lesser(a[0], a[1]), lesser(a[2], a[3])); }
