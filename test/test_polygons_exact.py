@@ -357,7 +357,9 @@ def test_large_polygons(rng):
     """Beyond some size supports are found by walking."""
     for count_a, count_b in ((40, 33), (90, 12)):
         rings = [
-            hull(np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n]))
+            hull(
+                np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n])
+            )
             for n in (count_a, count_b)
         ]
         for offset, velocity in (((9.0, 1.0), (-1.0, 0.1)), ((5.9, 0.0), (-1.0, 0.1)), ((0.5, 0.25), (1.0, 2.0))):
@@ -482,9 +484,10 @@ def test_law_time_reversal(scenes):
     for a, va, b, vb, _ in ends[:150]:
         truth = exact.first_contact(a, va, b, vb, INF)
         late = math.ceil(truth.last_time) + 1
-        end = [(float(x + late * va[0]), float(y + late * va[1])) for x, y in a], [
-            (float(x + late * vb[0]), float(y + late * vb[1])) for x, y in b
-        ]
+        end = (
+            [(float(x + late * va[0]), float(y + late * va[1])) for x, y in a],
+            [(float(x + late * vb[0]), float(y + late * vb[1])) for x, y in b],
+        )
         back = contacts([(end[0], tuple(-c for c in va), end[1], tuple(-c for c in vb), INF)])
         assert back.status[0] == gs.WILL_TOUCH
         assert back.time[0] == nearest_double(late - truth.last_time)

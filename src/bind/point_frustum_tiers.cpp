@@ -121,7 +121,8 @@ Rungs measure_blocks(const View<Sides>& view, const DistanceFrame<Lanes, Sides>&
                      Distances out) {
     constexpr std::size_t kDimension = Sides + 1;
     const WideFrame<Sides> wide = wide_frame(view, frame);
-    const auto measure = has_fused() ? measure_fused<Kinds, Skewed, Sides> : measure_plain<Kinds, Skewed, Sides>;
+    const auto measure =
+        has_fused() ? measure_fused<Kinds, Skewed, Sides> : measure_plain<Kinds, Skewed, Sides>;
     Block<Sides> block;
     Rungs rungs;
     for (std::size_t first = 0; first < count;) {
@@ -168,9 +169,9 @@ Rungs measure_exactly(const View<Sides>& view, const ExactPointFrustum<Sides>& e
     const auto frame = distance_frame<Lanes>(view);
     with_windows(frame, [&](auto kinds) {
         using Kinds = decltype(kinds);
-        rungs = (frame.refinements > 0 ? measure_blocks<Kinds, true, Sides>
-                                       : measure_blocks<Kinds, false, Sides>)(view, frame, exact, points,
-                                                                              count, out);
+        rungs = (frame.refinements > 0
+                     ? measure_blocks<Kinds, true, Sides>
+                     : measure_blocks<Kinds, false, Sides>)(view, frame, exact, points, count, out);
     });
     return rungs;
 }
@@ -211,8 +212,8 @@ nb::object exact_batch(const Packed& packed, const Points& points, bool witness,
                                simplex.data + 8 * i);
         }
     }
-    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array, simplex.array,
-                          nb::make_tuple(rungs.filter, rungs.wide, rungs.exact));
+    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array,
+                          simplex.array, nb::make_tuple(rungs.filter, rungs.wide, rungs.exact));
 }
 
 }  // namespace
