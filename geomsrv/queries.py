@@ -51,7 +51,7 @@ CULL_COUNTS = {
 }
 # What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
-CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
+CLIMB = {"bound": RUNGS[:1], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 SOLID_TIERS = ("float64", "exact")
 
 
@@ -199,7 +199,10 @@ def first_contact(
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
-        Tier; see the numerics page.
+        Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
+        rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
+        circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
+        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -240,7 +243,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, tuple(CLIMB) if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -418,7 +421,7 @@ def _polygon_distance(
     a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
 ) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
-    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
+    tier = _validate.accuracy(accuracy, tuple(CLIMB))
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(

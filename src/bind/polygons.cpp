@@ -117,7 +117,7 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
         points.insert(points.end(), contact.points.begin(), contact.points.end());
         rows.point_offsets[i + 1] = static_cast<std::int64_t>(points.size());
         rows.certain[i] = contact.certain;
-        ++counts[static_cast<std::size_t>(contact.rung) - 1];
+        ++counts[static_cast<std::size_t>(contact.rung)];
     }
     return points;
 }
