@@ -388,8 +388,7 @@ def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:
         return batch.center, batch.axes, batch.half_extents
     if isinstance(batch, Polytopes):
         return batch.vertices, batch.offsets
-    corners, error = batch.corners(batch.origin), batch.corner_error(batch.origin)
-    return batch.packed(), corners, np.array([error])
+    return (batch.packed(),)
 
 
 def _length(side: Batch) -> int:

@@ -75,6 +75,7 @@ def check(a: Any, b: Any, pose: np.ndarray | None, vertices_a: Any, vertices_b: 
 def check_points(answer: gs.Distances, vertices_a: Any, vertices_b: Any, text: str) -> None:
     """Nearest points are members, their difference is distance times normal, and the normal separates."""
     a, b = (np.array([[float(x) for x in v] for v in vertices]) for vertices in (vertices_a, vertices_b))
+    # Everything in a unit in which nothing over- or underflows, relative to the extent of the scene.
     size = max(np.abs(a).max(), np.abs(b).max(), float(abs(answer.distance[0])), 5e-324)
     unit = 2.0 ** -math.frexp(size)[1] if size > 1e-300 else 2.0**1000
     reach = max(np.ptp(a * unit, axis=0).max(), np.ptp(b * unit, axis=0).max(), abs(answer.distance[0] * unit))
