@@ -7,7 +7,7 @@ HPP := $(wildcard src/*/*.hpp)
 # would keep them from finding those of .venv.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help build test soak demo bench lint format colcon clean
+.PHONY: help build test soak hard demo bench lint format colcon clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):[^#]*## /\1\t/p' Makefile | expand -t 10
@@ -20,6 +20,9 @@ test: build  ## run the tests on the installed package; ARGS="-k cull" selects s
 
 soak: build  ## run all tests, the long ones too, with larger random counts
 	GEOMSRV_SOAK=1 $(BIN)/pytest -m "soak or not soak" --timeout 7200 $(ARGS)
+
+hard: build  ## judge the hard cases of every class by exact arithmetic; writes docs/hard_cases.md
+	PYTHONPATH=test $(BIN)/python -m hard $(ARGS)
 
 demo: build  ## a real robot, a node and a client; writes a picture
 	$(BIN)/geomsrv demo $(ARGS)

@@ -9,6 +9,7 @@ Importable without ROS.  Everything public is re-exported here; see `geomsrv.que
 from geomsrv._version import __version__
 from geomsrv.answers import (
     Booleans,
+    Certificates,
     ContactStatus,
     Cost,
     Cull,
@@ -50,6 +51,7 @@ from geomsrv.shapes import (
     Sphere,
     Triangle,
 )
+from geomsrv.verify import verify, verify_record
 
 __all__ = [
     "Booleans",
@@ -57,6 +59,7 @@ __all__ = [
     "Boxes",
     "Capsule",
     "CertificateError",
+    "Certificates",
     "Cone",
     "ContactStatus",
     "Convex",
@@ -104,6 +107,8 @@ __all__ = [
     "distance_to_frustum",
     "first_contact",
     "intersects",
+    "verify",
+    "verify_record",
 ]
 
 OUTSIDE, INTERSECTS, INSIDE = CullState.OUTSIDE, CullState.INTERSECTS, CullState.INSIDE

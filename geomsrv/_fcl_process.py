@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from geomsrv import fcl_worker
 from geomsrv._judge import Solid
 
-__all__ = ["FclProcess", "FclUnavailableError", "WorkerLostError"]
+__all__ = ["PACKAGES", "FclProcess", "FclUnavailableError", "WorkerLostError"]
 
 # Python, numpy and FCL load in 0.3 s on an idle laptop core; a hundred times that is not slow but stuck.
 START_TIMEOUT_S = 30.0
@@ -37,9 +37,12 @@ STDERR_BYTES = 2000
 # Shapes the worker keeps; with more it starts afresh.
 MAX_SHAPES = 4096
 
+# What pip calls the peers.
+PACKAGES = {"fcl": "python-fcl", "coal": "coal"}
+
 
 class FclUnavailableError(Exception):
-    """FCL cannot be loaded, and a new worker could not either."""
+    """The peer cannot be loaded, and a new worker could not either."""
 
 
 class WorkerLostError(Exception):
@@ -67,7 +70,9 @@ class FclProcess:
     timeout_s : float
         Longest time for one pair [s].
     command : tuple of str
-        What to run; the time limit is appended.
+        What to run; the time limit and the peer's name are appended.
+    peer : str
+        "fcl" or "coal".
 
     Raises
     ------
@@ -75,8 +80,9 @@ class FclProcess:
         It cannot be started.
     """
 
-    def __init__(self, timeout_s: float, command: tuple[str, ...]) -> None:
+    def __init__(self, timeout_s: float, command: tuple[str, ...], peer: str = "fcl") -> None:
         self._timeout_s = timeout_s
+        self._peer = peer
         self._known: set[int] = set()
         self._last_words = b""
         environment = dict(os.environ)
@@ -86,7 +92,7 @@ class FclProcess:
         environment |= {"PYTHONSAFEPATH": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         try:
             self._process = subprocess.Popen(
-                [*command, repr(timeout_s)],
+                [*command, repr(timeout_s), peer],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -96,7 +102,7 @@ class FclProcess:
                 start_new_session=True,
             )
         except OSError as error:
-            raise FclUnavailableError(f"cannot start the fcl worker: {error}") from error
+            raise FclUnavailableError(f"cannot start the {peer} worker: {error}") from error
         assert self._process.stdin and self._process.stdout and self._process.stderr
         self._stdin, self._stdout, self._stderr = (
             stream.fileno() for stream in (self._process.stdin, self._process.stdout, self._process.stderr)
@@ -111,7 +117,7 @@ class FclProcess:
         return self._process.pid
 
     def wait_until_ready(self) -> None:
-        """Wait until FCL is loaded, and note its version.
+        """Wait until the peer is loaded, and note its version.
 
         Raises
         ------
@@ -130,7 +136,7 @@ class FclProcess:
                 size += length
         text = data[header:].decode(errors="replace")
         if tag == b"E":
-            raise FclUnavailableError(f"python-fcl cannot be loaded: {text}")
+            raise FclUnavailableError(f"{PACKAGES[self._peer]} cannot be loaded: {text}")
         self.version = text
 
     def teach(self, solids: Sequence[Solid]) -> None:
@@ -243,7 +249,7 @@ class FclProcess:
             what = f"died: {signal.Signals(-code).name if code < 0 else f'exit status {code}'}"
         words = self._last_words.decode(errors="replace").strip()
         return WorkerLostError(
-            f"fcl worker {what}{f'; {words}' if words else ''}", np.zeros(0, fcl_worker.REPLY), by_clock
+            f"{self._peer} worker {what}{f'; {words}' if words else ''}", np.zeros(0, fcl_worker.REPLY), by_clock
         )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import fcl_worker
-from geomsrv._fcl_process import WORKER_COMMAND, FclProcess, FclUnavailableError, WorkerLostError
+from geomsrv._fcl_process import PACKAGES, WORKER_COMMAND, FclProcess, FclUnavailableError, WorkerLostError
 from geomsrv._judge import Solid
 
 __all__ = ["FclSupervisor", "NoReply"]
@@ -49,11 +49,14 @@ class FclSupervisor:
     ----------
     timeout_s : float
         Longest time FCL may take for one pair [s].
+    peer : str
+        "coal" to ask Coal in FCL's place.
     """
 
-    def __init__(self, timeout_s: float) -> None:
+    def __init__(self, timeout_s: float, peer: str = "fcl") -> None:
         self._timeout_s = timeout_s
-        self._reason = _fcl_is_missing()
+        self._peer = peer
+        self._reason = _missing(peer)
         # Guards what follows; notified on stopping.
         self._changed = threading.Condition()
         self._stopping = False
@@ -144,7 +147,7 @@ class FclSupervisor:
                 if self._pause() > 0.0:
                     return NoReply.BACKING_OFF
             try:
-                process = FclProcess(self._timeout_s, WORKER_COMMAND)
+                process = FclProcess(self._timeout_s, WORKER_COMMAND, self._peer)
                 self._adopt(process)
                 process.wait_until_ready()
             except FclUnavailableError as error:
@@ -180,10 +183,10 @@ class FclSupervisor:
         self.close()
 
 
-def _fcl_is_missing() -> str:
-    """Why python-fcl cannot be used, as far as that shows without loading it; empty if it may be there."""
+def _missing(peer: str) -> str:
+    """Why a peer cannot be used, as far as that shows without loading it; empty if it may be there."""
     try:
-        found = importlib.util.find_spec("fcl") is not None
+        found = importlib.util.find_spec(peer) is not None
     except (ImportError, ValueError):
         found = False
-    return "" if found else "python-fcl is not installed (pip install python-fcl)"
+    return "" if found else f"{PACKAGES[peer]} is not installed (pip install {PACKAGES[peer]})"

@@ -4,15 +4,16 @@
 
 Pure functions, no process and no thread.
 
-FCL is a peer, not a judge.  A difference counts as explained only if our witnesses, checked without the
-engine (`geomsrv._witness`), prove FCL wrong, or if FCL contradicts itself.
+FCL is a peer, not a judge.  A difference is decided by exact arithmetic where there is a kernel for it; elsewhere it is
+FCL's fault only if our witnesses, checked without the engine (`geomsrv._witness`), prove FCL wrong, or if FCL
+contradicts itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from geomsrv.shapes import Frustum, PackedShapes, Shape, pack
 
 __all__ = [
     "PEERS",
+    "Blame",
     "Claim",
     "Peer",
     "Rows",
@@ -242,25 +244,36 @@ class Claim(NamedTuple):
     jitter: float
 
 
-def explain(claim: Claim, proof: Bracket, moved: list[tuple[bool, float]]) -> tuple[bool | None, str]:
-    """Who is wrong: True for FCL as shown, False if nothing shows it, None if too close to call; and why.
+class Blame(StrEnum):
+    """Who is shown to be wrong."""
+
+    FCL = "fcl"
+    ENGINE = "engine"
+    NOBODY = "nobody"  #: the evidence does not decide it
+
+
+def explain(
+    claim: Claim, proof: Bracket, moved: list[tuple[bool, float]], *, exact: bool = False
+) -> tuple[Blame | None, str]:
+    """Who is wrong, None if that is too close to call; and why.
 
     Parameters
     ----------
     claim : Claim
     proof : Bracket
-        What our witnesses prove.
+        What our witnesses prove, or with `exact` what exact arithmetic gives.
     moved : list of (bool, float)
         FCL's contact and gap after b moved by `claim.jitter`, one for each direction in which FCL answered.
+    exact : bool
     """
     c = claim
-    proven = f"[{proof.lower:.9g}, {proof.upper:.9g}]"
+    proven = f"{'exact arithmetic gives' if exact else 'our witnesses prove'} [{proof.lower:.9g}, {proof.upper:.9g}]"
     if c.verdict == Verdict.INTERVAL:
-        return False, "our distance is outside of our own interval"
+        return Blame.ENGINE, "our distance is outside of our own interval"
     # The gap along a direction is a lower bound of the signed distance, too, so this holds for overlaps as
     # well.
     if not proof.lower - c.rounding <= c.distance <= proof.upper + c.rounding:
-        return False, f"our own witnesses prove {proven}"
+        return Blame.ENGINE, proven
 
     if c.contact:
         refuted = proof.lower > c.band
@@ -282,7 +295,7 @@ def explain(claim: Claim, proof: Bracket, moved: list[tuple[bool, float]]) -> tu
     if jump > allowed:
         contradiction = f"fcl's distance jumps by {jump:.3g} m where b moves by {c.jitter:.3g} m"
     if refuted:
-        return True, "; ".join(filter(None, (f"our witnesses prove {proven}", contradiction)))
+        return Blame.FCL, "; ".join(filter(None, (proven, contradiction)))
     agrees = all(
         c.lower <= c.jitter + c.band
         if contact
@@ -290,5 +303,5 @@ def explain(claim: Claim, proof: Bracket, moved: list[tuple[bool, float]]) -> tu
         for contact, gap in moved
     )
     if contradiction and agrees:
-        return True, f"{contradiction}, and then agrees"
-    return False, f"our witnesses prove {proven}, which does not decide it"
+        return Blame.FCL, f"{contradiction}, and then agrees"
+    return Blame.NOBODY, f"{proven}, which does not decide it"

@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geomsrv._judge import AnyShape
+from geomsrv._judge import AnyShape, Blame
 from geomsrv.shapes import pack
 
 __all__ = ["Difference", "KindTally", "Mode", "SkipReason", "Tally"]
@@ -62,8 +62,8 @@ class Difference:
     fcl_intersects : bool
     fcl_distance : float
         [m]; NaN where FCL was not asked or sees a contact.
-    explained : bool
-        True if FCL is shown to be wrong, by `reason`.
+    blame : Blame
+        Who is shown to be wrong, by `reason`.
     reason : str
         What decided that, in words.
     """
@@ -79,8 +79,13 @@ class Difference:
     upper: float
     fcl_intersects: bool
     fcl_distance: float
-    explained: bool
+    blame: Blame
     reason: str
+
+    @property
+    def explained(self) -> bool:
+        """Whether FCL is shown to be wrong."""
+        return self.blame == Blame.FCL
 
     def reproducer(self) -> str:
         """Python expression that repeats the query; floats in hex, so that no bit is lost.
@@ -96,8 +101,11 @@ class Difference:
         return (
             f"{self.kind}{f' ({self.label})' if self.label else ''}: {self.question} differs, here "
             f"{self.distance:.9g} m in [{self.lower:.9g}, {self.upper:.9g}], fcl {theirs}; "
-            f"{'explained' if self.explained else 'UNEXPLAINED'}: {self.reason}"
+            f"{_WORDS[self.blame]}: {self.reason}"
         )
+
+
+_WORDS = {Blame.FCL: "explained", Blame.ENGINE: "THE ENGINE IS WRONG", Blame.NOBODY: "UNEXPLAINED"}
 
 
 def _hex(value: ArrayLike) -> str:
@@ -127,7 +135,8 @@ class KindTally:
 
     agreed: int = 0
     explained: int = 0  #: differences shown to be FCL's fault
-    unexplained: int = 0  #: differences that nobody has accounted for: look at these
+    unexplained: int = 0  #: all others: look at these
+    engine_wrong: int = 0  #: those of the unexplained that are shown to be the engine's fault
     skipped: int = 0
 
     @property
@@ -189,8 +198,13 @@ class Tally:
 
     @property
     def unexplained(self) -> int:
-        """Differences that nobody has accounted for."""
+        """Differences that are not shown to be FCL's fault."""
         return sum(kind.unexplained for kind in self.kinds.values())
+
+    @property
+    def engine_wrong(self) -> int:
+        """Differences that are shown to be the engine's fault."""
+        return sum(kind.engine_wrong for kind in self.kinds.values())
 
     @property
     def skipped(self) -> int:
@@ -204,6 +218,8 @@ class Tally:
         if not self.available:
             return f"cross-check {self.mode}: {self.message}"
         parts = [f"{self.agreed} agreed", f"{self.explained} explained", f"{self.unexplained} unexplained"]
+        if self.engine_wrong:
+            parts[-1] += f" ({self.engine_wrong} wrong here)"
         if self.skipped:
             reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(self.reasons.items()))
             parts.append(f"{self.skipped} skipped ({reasons})")

@@ -19,6 +19,7 @@ from geomsrv import _core
 from geomsrv.errors import GeometryError, NotAvailableError
 
 ACCURACIES = ("bound", "float32", "float64", "exact")  #: every tier, cheapest first
+CERTIFIED_ACCURACIES = ("float64", "exact")  #: the tiers whose answers can be proven
 
 # A rotation is refused if a row's length or the angle between two rows is off by more than this: beyond it
 # the caller has passed something else (a scaled matrix, a transposed block), not a rotation that drifted.
@@ -198,12 +199,13 @@ def accuracy(value: Any, available: tuple[str, ...] = ("float64",)) -> str:
     return value
 
 
-def certificates(value: Any) -> None:
-    """Certificates are named in the interface and arrive with the exact tier."""
+def certificates(value: Any, tier: str) -> bool:
+    """Whether certificates are wanted; bounding volumes and single precision leave nothing that could be proven."""
     if not isinstance(value, (bool, np.bool_)):
         raise GeometryError(f"certificates must be True or False, got {value!r}")
-    if value:
-        raise NotAvailableError("certificates=True is not available yet")
+    if value and tier not in CERTIFIED_ACCURACIES:
+        raise GeometryError(f"certificates need accuracy {' or '.join(CERTIFIED_ACCURACIES)}, got {tier!r}")
+    return bool(value)
 
 
 def want(value: Any, known: tuple[str, ...]) -> frozenset[str]:

@@ -7,16 +7,20 @@ Only values live here.  Row i of every array belongs to item i of the batch; NaN
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "Booleans",
+    "Certificates",
     "ContactStatus",
     "Cost",
     "Cull",
@@ -31,6 +35,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 BoolArray = NDArray[np.bool_]
+Record = dict[str, Any]
 
 
 class CullState(IntEnum):
@@ -98,7 +103,69 @@ class Cost:
 
 
 @dataclass(frozen=True, eq=False)
-class Cull:
+class Certificates:
+    """Records that prove an answer, one for each item, written when they are read; see the page on certificates.
+
+    Examples
+    --------
+    >>> import geomsrv as gs
+    >>> square = gs.Polygons.from_list([[(0, 0), (1, 0), (1, 1), (0, 1)]])
+    >>> other = gs.Polygons.from_list([[(3, 0), (4, 0), (4, 1), (3, 1)]])
+    >>> answer = gs.first_contact(square, other, (1, 0), (0, 0), accuracy="exact", certificates=True)
+    >>> answer.certificates[0]["claim"]["status"]
+    'WILL_TOUCH'
+    >>> gs.verify(answer)
+    """
+
+    _answer: Any = field(repr=False)
+    _record: Callable[[Any, int], Record] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self._answer.state if isinstance(self._answer, Cull) else self._answer.status)
+
+    def __getitem__(self, i: int) -> Record:
+        return self._record(self._answer, range(len(self))[i])
+
+    def __iter__(self) -> Iterator[Record]:
+        return (self[i] for i in range(len(self)))
+
+    def lines(self) -> Iterator[str]:
+        """Records as JSON, without line ends; floats as `float.hex` text, which loses nothing."""
+        return map(json_line, self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write all lines to a file, for the command ``geomsrv verify``."""
+        with open(path, "w", encoding="ascii") as file:
+            file.writelines(f"{line}\n" for line in self.lines())
+
+
+def json_line(record: Record) -> str:
+    """A record as JSON without a line's end."""
+    return json.dumps(_in_hex(record))
+
+
+def _in_hex(value: Any) -> Any:
+    if isinstance(value, float):
+        return value.hex()
+    if isinstance(value, dict):
+        return {name: _in_hex(item) for name, item in value.items()}
+    return [_in_hex(item) for item in value] if isinstance(value, list) else value
+
+
+@dataclass(frozen=True, eq=False)
+class _Certified:
+    """An answer that can be asked for with ``certificates=True``."""
+
+    _record: Callable[[Any, int], Record] | None = field(default=None, repr=False, kw_only=True)
+
+    @property
+    def certificates(self) -> Certificates | None:
+        """Records that prove this answer as it stands; None unless they were asked for."""
+        return None if self._record is None else Certificates(self, self._record)
+
+
+@dataclass(frozen=True, eq=False)
+class Cull(_Certified):
     """Answer of `cull`.
 
     Attributes
@@ -116,7 +183,7 @@ class Cull:
 
 
 @dataclass(frozen=True, eq=False)
-class Distances:
+class Distances(_Certified):
     """Answer of `distance` and `distance_to_frustum`.
 
     Attributes
@@ -170,7 +237,7 @@ class Distances:
 
 
 @dataclass(frozen=True, eq=False)
-class Booleans:
+class Booleans(_Certified):
     """Answer of `intersects`.
 
     Attributes
@@ -194,7 +261,7 @@ class Booleans:
 
 
 @dataclass(frozen=True, eq=False)
-class FirstContacts:
+class FirstContacts(_Certified):
     """Answer of `first_contact`.
 
     Attributes
@@ -210,6 +277,8 @@ class FirstContacts:
     points : (k, d) float64, point_offsets : (n + 1,) int64
         Contact set of item i: ``points[point_offsets[i]:point_offsets[i + 1]]``, one point, the two ends of a segment,
         or the counter-clockwise intersection polygon of bodies that overlap at the start.
+    certain : (n,) bool
+        True where exact arithmetic is proven to give the same ``status``.
     message : str
         Names what is unsupported; empty otherwise.
     cost : Cost
@@ -223,5 +292,6 @@ class FirstContacts:
     normal: FloatArray
     points: FloatArray
     point_offsets: IntArray
+    certain: BoolArray
     cost: Cost
     message: str = ""

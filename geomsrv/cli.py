@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 __all__ = ["main"]
 
@@ -26,12 +27,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     commands.add_parser("demo", help="a real robot, a node and a client; writes a picture", add_help=False)
     commands.add_parser("self-check", help="answer built-in hard cases and report; needs no ROS")
+    verify = commands.add_parser("verify", help="prove recorded answers in exact arithmetic; needs no ROS")
+    verify.add_argument("files", nargs="+", metavar="FILE", help="certificates as JSON, one a line")
+
+    crosscheck = commands.add_parser("crosscheck", help="hard cases through every tier and through FCL and Coal")
+    crosscheck.add_argument("--hard", action="store_true", required=True, help="the hard cases; needs no ROS")
+    crosscheck.add_argument("--cases", type=Path, metavar="FILE", help="JSON lines, by default those installed")
+    crosscheck.add_argument("--verbose", action="store_true", help="name every wrong answer of FCL and Coal, too")
 
     arguments = list(sys.argv[1:] if argv is None else argv)
     command, rest = arguments[:1], arguments[1:]
     if not (command and command[0] in PASSED_ON):
-        parser.parse_args(arguments)
-        return _self_check()
+        given = parser.parse_args(arguments)
+        if given.command == "crosscheck":
+            return _crosscheck([given.cases] if given.cases else None, given.verbose)
+        return _verify(given.files) if given.command == "verify" else _self_check()
     if command == ["demo"]:
         from geomsrv import demo
 
@@ -56,3 +66,50 @@ def _self_check() -> int:
     report = self_check()
     print(report.message)
     return 0 if report.ok else 1
+
+
+def _crosscheck(files: Sequence[Path] | None, verbose: bool) -> int:
+    from geomsrv.errors import GeometryError
+    from geomsrv.hard_cases import read, shipped
+    from geomsrv.hard_check import TIERS, check
+
+    files = shipped() if files is None else files
+    if not files:
+        print("geomsrv crosscheck: the cases are not installed; name a file with --cases", file=sys.stderr)
+        return 2
+    try:
+        report = check(case for file in files for case in read(file))
+    except (OSError, GeometryError) as error:
+        print(f"geomsrv crosscheck: {error}", file=sys.stderr)
+        return 2
+    print(report.text())
+    for line in report.wrong:
+        ours = line.partition(":")[0] in TIERS
+        if ours or verbose:
+            print(f"{'WRONG ' if ours else ''}{line}")
+    return 1 if report.engine_wrong else 0
+
+
+SHOWN = 3  # failures that are told one by one
+
+
+def _verify(files: Sequence[str]) -> int:
+    from geomsrv.verify import verify_lines
+
+    records, empty, failures = 0, 0, []
+    for name in files:
+        try:
+            with open(name, encoding="utf-8") as file:
+                for line, claims, fault in verify_lines(file):
+                    records += 1
+                    empty += not claims
+                    if fault:
+                        failures.append(f"{name}:{line}: {fault}")
+        except (OSError, UnicodeDecodeError) as fault:
+            print(f"geomsrv verify: cannot read {name}: {fault}", file=sys.stderr)
+            return 2
+    proven = records - empty - len(failures)
+    without = f", {empty} claim nothing" if empty else ""
+    first = "; ".join(failures[:SHOWN]) + ("; ..." if len(failures) > SHOWN else "")
+    print(f"{records} records: {proven} proven{without}, {len(failures)} failed" + (f": {first}" if first else ""))
+    return 1 if failures else 0

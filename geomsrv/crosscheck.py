@@ -28,6 +28,7 @@ from geomsrv._judge import (
     JITTER_DIRECTIONS,
     PEERS,
     AnyShape,
+    Blame,
     Claim,
     Rows,
     Solid,
@@ -39,16 +40,17 @@ from geomsrv._judge import (
     scales,
 )
 from geomsrv._tally import Difference, KindTally, Mode, SkipReason, Tally
-from geomsrv._witness import Placed, bracket
+from geomsrv._witness import Bracket, Placed, bracket
 from geomsrv.answers import Distances, DistanceStatus
-from geomsrv.errors import GeometryError
+from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.queries import distance
 
 if TYPE_CHECKING:
     from geomsrv.pairwise import ListedDistances
     from geomsrv.scene import PairDistances, Scene
     from geomsrv.world import World
 
-__all__ = ["CrossCheck", "Difference", "KindTally", "Mode", "SkipReason", "Tally", "cross_check_scene"]
+__all__ = ["Blame", "CrossCheck", "Difference", "KindTally", "Mode", "SkipReason", "Tally", "cross_check_scene"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -446,6 +448,7 @@ class CrossCheck:
                 tally.explained += 1
             else:
                 tally.unexplained += 1
+                tally.engine_wrong += difference.blame == Blame.ENGINE
             self._recent[difference.explained].append(difference)
             self._unpolled.append(difference)
 
@@ -501,7 +504,7 @@ class CrossCheck:
         solids: list[tuple[Solid, Solid]],
         claims: list[Claim],
     ) -> None:
-        """Ask FCL again nearby, check our witnesses, and say who is wrong."""
+        """Ask FCL again nearby and exact arithmetic, or check our witnesses, and say who is wrong."""
         again = len(JITTER_DIRECTIONS)
         poses = jittered(rows.poses, np.array([claim.jitter for claim in claims]))
         replies = fcl.ask([pair for pair in solids for _ in range(again)], poses).reshape(-1, again)
@@ -511,10 +514,11 @@ class CrossCheck:
                 for outcome, gap in replies[i].tolist()
                 if outcome < fcl_worker.Outcome.FAILED
             ]
+            exact = _exactly(*rows.shapes[i], rows.poses[i])
             placed = Placed.at(a.kind, a.packed), Placed.at(b.kind, b.packed, rows.poses[i])
-            proof = bracket(*placed, rows.point_a[i], rows.point_b[i], rows.normal[i])
-            explained, reason = explain(claim, proof, moved)
-            if explained is None:
+            proof = exact or bracket(*placed, rows.point_a[i], rows.point_b[i], rows.normal[i])
+            blame, reason = explain(claim, proof, moved, exact=exact is not None)
+            if blame is None:
                 findings.skip(rows, np.arange(len(rows)) == i, SkipReason.TOO_CLOSE)
                 continue
             findings.differences.append(
@@ -530,7 +534,7 @@ class CrossCheck:
                     upper=claim.upper,
                     fcl_intersects=claim.contact,
                     fcl_distance=claim.gap,
-                    explained=explained,
+                    blame=blame,
                     reason=reason,
                 )
             )
@@ -575,6 +579,16 @@ def cross_check_scene(scene: Scene, max_distance: float = np.inf, *, timeout_s: 
         check.submit_scene(scene, pairs)
         check.drain(timeout_s)
     return check.tally()
+
+
+def _exactly(a: AnyShape, b: AnyShape, pose: FloatArray) -> Bracket | None:
+    """What exact arithmetic gives for a pair; None where there is no kernel for that."""
+    try:
+        answer = distance(a, b, pose, accuracy="exact", want=("penetration",))
+    except NotAvailableError:
+        return None
+    decided = answer.status[0] == DistanceStatus.OK
+    return Bracket(float(answer.lower[0]), float(answer.upper[0])) if decided else None
 
 
 @dataclass

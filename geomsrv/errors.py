@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from geomsrv.verify import CertificateError  # defined there, as the checker needs no other file
+
 __all__ = ["CertificateError", "GeometryError", "NotAvailableError", "SceneError"]
 
 
@@ -27,7 +29,3 @@ class SceneError(GeometryError):
     def __init__(self, errors: dict[str, str]) -> None:
         self.errors = dict(errors)
         super().__init__("; ".join(f"{name!r}: {fault}" for name, fault in self.errors.items()))
-
-
-class CertificateError(ValueError):
-    """A certificate does not prove the answer it came with."""

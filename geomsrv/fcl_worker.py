@@ -3,7 +3,8 @@
 """The process in which FCL runs: reads pairs from stdin, writes what FCL says of each to stdout.
 
 Started as a script by `geomsrv._fcl_process`, so it loads neither the package nor the engine.  It is built to
-be lost: FCL can abort, hang or segfault, and whatever it does ends this process and nothing else.
+be lost: FCL can abort, hang or segfault, and whatever it does ends this process and nothing else.  Coal, which came
+from FCL, runs in the same way: the arguments are the time limit and the peer's name.
 
 Of FCL only ``collide()`` and the unsigned ``distance()`` are called.  Signed distance aborts (uncaught
 ``std::logic_error``), hangs (concentric spheres, coaxial capsules) and segfaults (half spaces); the unsigned
@@ -14,8 +15,8 @@ Messages, both ways: a tag byte and the payload's size (`HEADER`), then the payl
 ==== ========= ===============================================================================================
 tag  direction payload
 ==== ========= ===============================================================================================
-H    out       once, first: FCL is loaded; its version
-E    out       once, first and last: FCL cannot be loaded; why
+H    out       once, first: the peer is loaded; its version
+E    out       once, first and last: it cannot be loaded; why
 D    in        one shape: `DEFINITION`, then the vertices, float64
 F    in        forget all shapes; empty
 P    in        pairs: `REQUEST` rows; answered by one `REPLY` row each, bare, as soon as it is known
@@ -53,39 +54,57 @@ class Outcome(IntEnum):
     FAILED = 2  #: python-fcl raised, or answered NaN
 
 
-class Fcl:
-    """Shapes by id, and what FCL says of two of them."""
+class Peer:
+    """Shapes by id, and what another engine says of two of them."""
 
     def __init__(self) -> None:
-        import fcl
-
-        self.module = fcl
-        self.version = str(getattr(fcl, "__version__", "unknown"))
-        self._unsigned = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=False)
         self._pending: dict[int, bytes] = {}
-        self._objects: dict[int, tuple[str, Any, Any]] = {}
+        self._shapes: dict[int, tuple[str, Any]] = {}
+        self.version = "unknown"
 
     def define(self, payload: bytes) -> None:
-        """Keep a shape; FCL's geometry is made on first use, under the clock of the pair that needs it."""
+        """Keep a shape; the peer's geometry is made on first use, under the clock of the pair that needs it."""
         self._pending[DEFINITION.unpack_from(payload)[0]] = payload
 
     def forget(self) -> None:
         """Drop every shape."""
         self._pending.clear()
-        self._objects.clear()
+        self._shapes.clear()
 
-    def _object(self, number: int) -> tuple[str, Any, Any]:
-        """(kind, object that stays at the origin, object that gets moved)."""
-        found = self._objects.get(number)
+    def _shape(self, number: int) -> tuple[str, Any]:
+        """Kind, and what `_made` made of it."""
+        found = self._shapes.get(number)
         if found is None:
             payload = self._pending.pop(number)
             _, name, *params = DEFINITION.unpack_from(payload)
             kind = name.rstrip(b"\0").decode()
-            geometry = self._geometry(
-                kind, params, np.frombuffer(payload, "<f8", offset=DEFINITION.size).reshape(-1, 3)
-            )
-            found = self._objects[number] = (kind, *(self.module.CollisionObject(geometry) for _ in range(2)))
+            vertices = np.frombuffer(payload, "<f8", offset=DEFINITION.size).reshape(-1, 3)
+            found = self._shapes[number] = (kind, self._made(kind, params, vertices))
         return found
+
+    def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
+        raise NotImplementedError
+
+    def measure(self, a: int, b: int, pose: NDArray[np.float64]) -> tuple[int, float]:
+        """Outcome and distance of one pair, b placed by `pose` in the frame of a."""
+        raise NotImplementedError
+
+
+class Fcl(Peer):
+    """FCL."""
+
+    def __init__(self) -> None:
+        import fcl
+
+        super().__init__()
+        self.module = fcl
+        self.version = str(getattr(fcl, "__version__", "unknown"))
+        self._unsigned = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=False)
+
+    def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
+        """An object that stays at the origin, and one that gets moved."""
+        geometry = self._geometry(kind, params, vertices)
+        return tuple(self.module.CollisionObject(geometry) for _ in range(2))
 
     def _geometry(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
         if kind == "sphere":
@@ -102,8 +121,8 @@ class Fcl:
 
     def measure(self, a: int, b: int, pose: NDArray[np.float64]) -> tuple[int, float]:
         """Outcome and distance of one pair, b placed by `pose` in the frame of a."""
-        kind_a, first, _ = self._object(a)
-        kind_b, _, second = self._object(b)
+        kind_a, (first, _) = self._shape(a)
+        kind_b, (_, second) = self._shape(b)
         # ROS order x y z w -> FCL's w x y z.
         second.setTransform(self.module.Transform(pose[[6, 3, 4, 5]], pose[:3]))
         if self.module.collide(first, second):
@@ -115,6 +134,56 @@ class Fcl:
             return Outcome.FAILED, gap
         # -1 is FCL's word for a contact; collide() misses some between flat hulls.
         return (Outcome.APART, gap) if gap > 0.0 else (Outcome.CONTACT, np.nan)
+
+
+class Coal(Peer):
+    """Coal, formerly hpp-fcl."""
+
+    # Hulls of up to so many points are searched point by point; larger ones along edges, which take a hull.
+    SMALL = 32
+
+    def __init__(self) -> None:
+        import coal
+
+        super().__init__()
+        self.module = coal
+        self.version = str(coal.__version__)
+
+    def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
+        if kind == "sphere":
+            return self.module.Sphere(params[0])
+        if kind == "capsule":
+            return self.module.Capsule(params[0], 2.0 * params[1])
+        if kind == "box":
+            return self.module.Box(*(2.0 * half for half in params[:3]))
+        if kind == "half_space":
+            return self.module.Halfspace(np.array(params[:3]), params[3])
+        points = self.module.StdVec_Vec3s()
+        points.extend(list(vertices))
+        if len(vertices) > self.SMALL:
+            return self.module.Convex.convexHull(points, False, None)
+        return self.module.Convex(points, self.module.StdVec_Triangle())
+
+    def measure(self, a: int, b: int, pose: NDArray[np.float64]) -> tuple[int, float]:
+        """Outcome and distance of one pair, b placed by `pose` in the frame of a."""
+        _, first = self._shape(a)
+        _, second = self._shape(b)
+        x, y, z, w = pose[3:].tolist()
+        here = self.module.Transform3s()
+        there = self.module.Transform3s(self.module.Quaternion(w, x, y, z).matrix(), pose[:3])
+        found = self.module.CollisionResult()
+        self.module.collide(first, here, second, there, self.module.CollisionRequest(), found)
+        if found.isCollision():
+            return Outcome.CONTACT, np.nan
+        request, result = self.module.DistanceRequest(), self.module.DistanceResult()
+        request.enable_signed_distance = False
+        gap = float(self.module.distance(first, here, second, there, request, result))
+        if not gap < np.inf:
+            return Outcome.FAILED, gap
+        return (Outcome.APART, gap) if gap > 0.0 else (Outcome.CONTACT, np.nan)
+
+
+PEERS = {"fcl": Fcl, "coal": Coal}
 
 
 def read_exactly(source: int, size: int) -> bytes:
@@ -129,11 +198,11 @@ def read_exactly(source: int, size: int) -> bytes:
     return b"".join(parts)
 
 
-def answer(engine: Fcl, rows: NDArray[np.void], timeout_s: float, sink: int) -> None:
+def answer(engine: Peer, rows: NDArray[np.void], timeout_s: float, sink: int) -> None:
     """Write one reply per row, each at once: what was written before a crash tells which pair did it."""
     reply = struct.Struct("<Bd")  # one `REPLY`
     for a, b, pose in zip(rows["a"].tolist(), rows["b"].tolist(), rows["pose"], strict=True):
-        # A hang inside FCL never returns to Python.  The default action of SIGALRM ends it, even if the
+        # A hang inside a peer never returns to Python.  The default action of SIGALRM ends it, even if the
         # parent is gone.
         signal.setitimer(signal.ITIMER_REAL, timeout_s)
         try:
@@ -147,7 +216,7 @@ def answer(engine: Fcl, rows: NDArray[np.void], timeout_s: float, sink: int) -> 
 
 def main() -> None:
     """Serve until stdin ends."""
-    timeout_s = float(sys.argv[1])
+    timeout_s, name = float(sys.argv[1]), sys.argv[2]
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
     # FCL and libccd print to stdout; that must not end up between our rows.
@@ -155,7 +224,7 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     os.nice(NICENESS)
     try:
-        engine = Fcl()
+        engine = PEERS[name]()
     except Exception as error:
         text = f"{type(error).__name__}: {error}".encode()
         os.write(sink, HEADER.pack(b"E", len(text)) + text)

@@ -224,7 +224,7 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
 def polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
     """Distances of polygons, in any order."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
-    gap, lower, upper, point_a, point_b, normal, status = _core.distance_polygons(*rings, penetration)
+    gap, lower, upper, point_a, point_b, normal, status, *_ = _core.distance_polygons(*rings, penetration)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     lower, upper = _widened(lower, upper, uncertainty, penetration)
     return DistanceRows(
@@ -304,7 +304,7 @@ def polygon_contacts(world: World, pairs: IntArray, velocities: FloatArray, hori
     """The engine's answer for polygons with the given velocities."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
     velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k]]) for k in range(2))
-    status, time, lower, upper, last, normal, points, offsets = _core.first_contact_polygons(
+    status, time, lower, upper, last, normal, points, offsets, *_ = _core.first_contact_polygons(
         *rings, velocity_a, velocity_b, horizon, True
     )
     sets = np.empty(len(pairs), dtype=object)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -20,6 +21,7 @@ from geomsrv.answers import (
     DistanceStatus,
     FirstContacts,
 )
+from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
 from geomsrv.shapes import (
     Boxes,
@@ -39,8 +41,18 @@ __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersec
 FloatArray = NDArray[np.float64]
 Batch = Boxes | Polygons | Polytopes | Frustum
 
+TIERS = ("bound", "float32", "float64", "exact")  #: of queries that answer at all of them
+CULL_STAGES = ("bound", "filter", "wide", "exact", "uncertain")  # in the order in which the engine counts
+CULL_COUNTS = {
+    "bound": ("bound", "uncertain"),
+    "float32": ("bound", "filter", "uncertain"),
+    "float64": ("bound", "filter", "uncertain"),
+    "exact": ("bound", "filter", "wide", "exact"),
+}
+# What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
+RUNGS = ("bound", "filter", "wide", "exact")
+CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 SOLID_TIERS = ("float64", "exact")
-RUNGS = ("bound", "filter", "wide", "exact")  # how high an answer had to climb, as the engine numbers it
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -54,7 +66,7 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     accuracy : str
         Tier; see the numerics page.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -84,11 +96,13 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
-    tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
-    state, certain, counts = _core.cull(frustum.packed(), boxes.center, boxes.axes, boxes.half_extents)
-    stages = dict(zip(("bound", "filter", "uncertain"), counts, strict=True))
-    return Cull(state, certain, Cost(time.perf_counter_ns() - start, tier, stages))
+    tier = _validate.accuracy(accuracy, TIERS)
+    certified = _validate.certificates(certificates, tier)
+    given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
+    state, certain, counts, *evidence = _core.cull(*given, tier, certified)
+    stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
+    cost = Cost(time.perf_counter_ns() - start, tier, stages)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, *evidence) if certified else None)
 
 
 def distance_to_frustum(
@@ -112,7 +126,7 @@ def distance_to_frustum(
     want : tuple of str
         "distance", and "witness" to find the nearest points right away instead of on first use.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -146,7 +160,7 @@ def distance_to_frustum(
     )
     array = _validate.floats(points, "points", (None, dimension))
     tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
+    certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
     packed = frustum.packed()
     gap, lower, upper, region, point_a = kernel(packed, array, "witness" in effects)
@@ -159,6 +173,7 @@ def distance_to_frustum(
         cost=Cost(time.perf_counter_ns() - start, tier, {"filter": len(array)}),
         region=region,
         _point_a=point_a if point_a is not None else lambda: cast(FloatArray, kernel(packed, array, True)[4]),
+        _record=certify_distances(frustum, array) if certified else None,
     )
 
 
@@ -188,7 +203,7 @@ def first_contact(
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
-        Not available yet.
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -225,8 +240,9 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy)
-    _validate.certificates(certificates)
+    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
+    certified = _validate.certificates(certificates, tier)
+    proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
         nothing = np.full(count, np.nan)
         return FirstContacts(
@@ -238,13 +254,16 @@ def first_contact(
             np.full((count, d), np.nan),
             np.zeros((0, d)),
             np.zeros(count + 1, np.int64),
+            np.zeros(count, np.bool_),
             Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
             "first contact of polytopes is unsupported in this version",
+            _record=proof,
         )
     answer = _core.first_contact_polygons(
-        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set)
+        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
     )
-    return FirstContacts(*answer, Cost(time.perf_counter_ns() - start, tier, {"filter": count}))
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
+    return FirstContacts(*answer[:-1], cost, _record=proof)
 
 
 def distance(
@@ -254,6 +273,7 @@ def distance(
     *,
     accuracy: str = "float64",
     want: tuple[str, ...] = ("distance",),
+    certificates: bool = False,
 ) -> Distances:
     """How far apart bodies are, their nearest points, and how deep they overlap.
 
@@ -267,6 +287,8 @@ def distance(
         Tier; see the numerics page.
     want : tuple of str
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
+    certificates : bool
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -291,11 +313,16 @@ def distance(
     array([-0.5])
     """
     start = time.perf_counter_ns()
-    solid = not (poses_ab is None and isinstance(a, Polygons))
-    tier = _validate.accuracy(accuracy, SOLID_TIERS if solid else ("float64",))
     effects = _validate.want(want, ("distance", "witness", "penetration"))
+    signed, poses = "penetration" in effects, None
+    if poses_ab is None and isinstance(a, Polygons):
+        found = _polygon_distance(a, b, signed, accuracy, start)[0]
+        proven = _validate.certificates(certificates, found.cost.accuracy)
+        return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
+    tier = _validate.accuracy(accuracy, SOLID_TIERS)
+    certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
-        answer, message = _batch_distance(a, b, "penetration" in effects, tier), ""
+        answer, message = _batch_distance(a, b, signed, tier, certified), ""
     else:
         shapes: list[Any] = [a, b]
         for shape, name in zip(shapes, "ab", strict=True):
@@ -304,7 +331,7 @@ def distance(
         pairs = np.broadcast_to(np.array([0, 1]), (len(poses), 2))
         frusta = np.array([x.packed() if isinstance(x, Frustum) else np.zeros(18) for x in shapes])
         answer = _core.distance_pairs(
-            *pack(shapes), np.ascontiguousarray(pairs), poses, "penetration" in effects, tier, frusta=frusta
+            *pack(shapes), np.ascontiguousarray(pairs), poses, signed, tier, evidence=certified, frusta=frusta
         )
         unsupported = (answer[6] == DistanceStatus.UNSUPPORTED).any()
         kinds = "-".join(shape.kind for shape in shapes)
@@ -325,11 +352,17 @@ def distance(
         _point_a=point_a,
         _normal=normal,
         message=message,
+        _record=certify_distances(a, b, answer[8], poses_ab=poses, signed=signed) if certified else None,
     )
 
 
 def intersects(
-    a: Shape | Batch, b: Shape | Batch, poses_ab: ArrayLike | None = None, *, accuracy: str = "float64"
+    a: Shape | Batch,
+    b: Shape | Batch,
+    poses_ab: ArrayLike | None = None,
+    *,
+    accuracy: str = "float64",
+    certificates: bool = False,
 ) -> Booleans:
     """Whether bodies touch or overlap now.
 
@@ -339,6 +372,8 @@ def intersects(
         Bodies, as for `distance`.
     accuracy : str
         Tier; see the numerics page.
+    certificates : bool
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
@@ -357,8 +392,14 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    if poses_ab is None and isinstance(a, Polygons):
+        answer, meet, certain = _polygon_distance(a, b, True, accuracy, time.perf_counter_ns())
+        proven = _validate.certificates(certificates, answer.cost.accuracy)
+        record = certify_distances(a, b, signed=True) if proven else None
+        return Booleans(meet, certain, answer.status, answer.cost, _record=record)
     # Without depth exact arithmetic tells touching from overlapping, too; float64 needs the margin.
-    answer = distance(a, b, poses_ab, accuracy=accuracy, want=() if accuracy == "exact" else ("penetration",))
+    want = () if accuracy == "exact" else ("penetration",)
+    answer = distance(a, b, poses_ab, accuracy=accuracy, want=want, certificates=certificates)
     value, certain = answer.distance <= 0.0, (answer.lower > 0.0) | (answer.upper <= 0.0)
     if accuracy == "exact" and not any(isinstance(body, (Sphere, Capsule, HalfSpace)) for body in (a, b)):
         # Correctly rounded: the upper neighbour of a distance, however short, is no zero.
@@ -369,17 +410,35 @@ def intersects(
         status=answer.status,
         cost=answer.cost,
         message=answer.message,
+        _record=answer._record,
     )
 
 
-def _batch_distance(a: Any, b: Any, penetration: bool, tier: str) -> tuple[Any, ...]:
+def _polygon_distance(
+    a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
+) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The engine's answer for polygons; whether they meet, and whether that is certain."""
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
+    _expect(b, Polygons, "b")
+    _common_length(len(a), len(b))
+    gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(
+        a.vertices, a.offsets, b.vertices, b.offsets, penetration, tier
+    )
+    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs))
+    return Distances(gap, lower, upper, point_b, status, cost, point_a, normal), meet, certain
+
+
+def _stages(tier: str, rungs: tuple[int, ...]) -> dict[str, int]:
+    """Items by what it took to answer them."""
+    return {name: count for name, count in zip(RUNGS, rungs, strict=True) if name in CLIMB[tier]}
+
+
+def _batch_distance(a: Any, b: Any, penetration: bool, tier: str, evidence: bool) -> tuple[Any, ...]:
     """The engine's answer for two batches in world coordinates."""
     _expect(a, (Boxes, Polygons, Polytopes, Frustum), "a")
-    _expect(b, (Polygons,) if isinstance(a, Polygons) else (Boxes, Polytopes, Frustum), "b")
+    _expect(b, (Boxes, Polytopes, Frustum), "b")
     _common_length(_length(a), _length(b))
-    if isinstance(a, Polygons):
-        return _core.distance_polygons(a.vertices, a.offsets, b.vertices, b.offsets, penetration)
-    return _core.distance_world(_side(a), _side(b), penetration, tier)
+    return _core.distance_world(_side(a), _side(b), penetration, tier, evidence)
 
 
 def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:

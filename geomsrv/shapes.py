@@ -9,6 +9,7 @@ convex hull of center +- e_i * axes_i even where the axes are not perfectly orth
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
@@ -203,15 +204,15 @@ class Frustum:
             raise GeometryError("target must differ from eye")
         view = end / 2.0 - start / 2.0  # halved, so that the difference cannot overflow
         view = view / np.abs(view).max()
-        view = view / np.linalg.norm(view)
+        view = view / math.hypot(*view)
         if not upward.any():
             raise GeometryError("up must not be zero")
         side = np.cross(upward / np.abs(upward).max(), view)
         # Below sqrt(eps) the side direction would be mostly rounding noise of the cross product.
-        if np.linalg.norm(side) <= np.sqrt(np.finfo(float).eps):
+        if math.hypot(*side) <= np.sqrt(np.finfo(float).eps):
             raise GeometryError("up must not be parallel to the view direction")
-        side = side / np.linalg.norm(side)
-        half = near_depth * float(np.tan(angle / 2.0))
+        side = side / math.hypot(*side)
+        half = near_depth * math.tan(angle / 2.0)
         return cls(start, [side, np.cross(view, side), view], half * ratio, half, near_depth, far_depth)
 
     @classmethod
@@ -277,8 +278,11 @@ class Frustum:
         """
         l0, l1, u0, u1 = self.bounds
         near = np.array([[x, y, self.near] for y in (u0, u1) for x in (l0, l1)])
-        local = np.concatenate([near, near * (self.far / self.near)]) @ self.axes
-        return (self.origin - np.asarray(origin, dtype=np.float64))[..., None, :] + local
+        both = np.concatenate([near, near * (self.far / self.near)])
+        # Written out: what a matrix product rounds depends on the processor.
+        local: FloatArray = both[:, :1] * self.axes[0] + both[:, 1:2] * self.axes[1] + both[:, 2:] * self.axes[2]
+        placed: FloatArray = (self.origin - np.asarray(origin, dtype=np.float64))[..., None, :] + local
+        return placed
 
     def corner_error(self, origin: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
         """How far rounding may have moved `corners` from the exact ones: scalar for one origin, (n,) for (n, 3)."""
@@ -604,7 +608,7 @@ class HalfSpace(Shape):
             raise GeometryError("normal must not be zero")
         # Scaled first: the squares of a huge or tiny normal would overflow or vanish.
         scaled = direction / largest
-        length = float(np.linalg.norm(scaled))
+        length = math.hypot(*scaled)
         distance = level / largest / length
         if not np.isfinite(distance):
             raise GeometryError(f"offset / |normal| must be finite, got {level} / |{direction.tolist()}|")

@@ -55,10 +55,10 @@ def make_context() -> rclpy.Context:
 class NodeUnderTest:
     """The node in this process, spinning in a thread, with its log kept."""
 
-    def __init__(self, **parameters: Any) -> None:
+    def __init__(self, namespace: str = "", **parameters: Any) -> None:
         self.context = make_context()
         overrides = [Parameter(name.replace("__", "."), value=value) for name, value in parameters.items()]
-        self.node = GeomsrvNode(context=self.context, parameter_overrides=overrides)
+        self.node = GeomsrvNode(context=self.context, namespace=namespace, parameter_overrides=overrides)
         self.errors: list[BaseException] = []
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -85,9 +85,12 @@ class NodeUnderTest:
 
 
 @contextmanager
-def running_node(**parameters: Any) -> Iterator[NodeUnderTest]:
-    """A node for the length of a block; parameters by name with "__" for "."."""
-    node = NodeUnderTest(**parameters)
+def running_node(namespace: str = "", **parameters: Any) -> Iterator[NodeUnderTest]:
+    """A node for the length of a block; parameters by name with "__" for ".".
+
+    Beside another node it needs a namespace of its own: of two services with one name either may answer.
+    """
+    node = NodeUnderTest(namespace, **parameters)
     try:
         yield node
     finally:

@@ -179,12 +179,16 @@ def test_frusta(other: str, rng: np.random.Generator) -> None:
         for step in range(2):
             b: Any
             if other == "boxes":
-                b = gs.Boxes([place + move], [rotation(any_turn(rng)).T if step == 0 else b.axes[0]], [[0.5, 0.25, 1.0]])
+                b = gs.Boxes(
+                    [place + move], [rotation(any_turn(rng)).T if step == 0 else b.axes[0]], [[0.5, 0.25, 1.0]]
+                )
             elif other == "polytopes":
                 b = gs.Polytopes.from_list([hull(rng, "block") + place if step == 0 else b.vertices + move])
             else:
-                b = random_frustum(rng) if step == 0 else gs.Frustum(
-                    b.origin + move, b.axes, near=b.near, far=b.far, bounds=b.bounds
+                b = (
+                    random_frustum(rng)
+                    if step == 0
+                    else gs.Frustum(b.origin + move, b.axes, near=b.near, far=b.far, bounds=b.bounds)
                 )
             pair = (a, b) if rng.random() < 0.5 else (b, a)
             answer, signed = check(*pair, None, *(corners_of(x) for x in pair))

@@ -4,137 +4,116 @@
 
 from __future__ import annotations
 
-import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import field_cases
-from oracle import polygon
+from hard.__main__ import FIELD, PAGE, missing
+from oracle import polygon, polytope
 
 import geomsrv as gs
+from geomsrv import _verdict
+from geomsrv._verdict import Verdict, judge
+from geomsrv.hard_cases import VERIFIED, Case, pose_of, read, scene_size, shape_of
 
-# The cases state poses by 17 digits of a rotation matrix; rewriting one as a quaternion moves points by a few ulps of
-# their coordinates.  The verified values are good to far less.
-TOLERANCE = 1e-13
-
-KERNELS = {"sphere", "capsule", "box", "convex", "triangle", "segment", "point", "halfspace"}
-
-
-def shape_of(case: dict[str, Any]) -> gs.Shape:
-    match case["type"]:
-        case "sphere":
-            return gs.Sphere(case["radius"])
-        case "capsule":
-            return gs.Capsule(case["radius"], case["length"])
-        case "box":
-            return gs.Box(np.array(case["size"], dtype=float) / 2)
-        case "halfspace":
-            return gs.HalfSpace(case["normal"], case["offset"])
-        case "point":
-            return gs.Point(case["point"])
-        case _:
-            return gs.Convex(case["vertices"])
+TIERS = ("float64", "exact")
+CASES = {case.name: case for case in read(FIELD) if case.truth and judge(case, "float64")}
+RECORDS = {
+    record["id"]: record
+    for kind in ("signed_distance", "distance", "segment_segment", "collide", "frustum_cull")
+    for record in field_cases(kind)
+}
 
 
-def pose_of(case: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    pose = case.get("pose", {"R": np.eye(3), "t": np.zeros(3)})
-    return np.array(pose["R"], dtype=float), np.array(pose["t"], dtype=float)
-
-
-def quaternion_of(rotation: np.ndarray) -> np.ndarray:
-    """x y z w, by the largest of the four: no cancellation (Shepperd 1978)."""
-    m = rotation
-    trace = m[0, 0] + m[1, 1] + m[2, 2]
-    squares = np.array([2 * m[0, 0] - trace, 2 * m[1, 1] - trace, 2 * m[2, 2] - trace, trace]) + 1
-    x, y, z, w = (
-        np.array([squares[0], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]]),
-        np.array([m[1, 0] + m[0, 1], squares[1], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]]),
-        np.array([m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], squares[2], m[1, 0] - m[0, 1]]),
-        np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]]),
-    )
-    best = (x, y, z, w)[int(np.argmax(squares))]
-    return best / np.linalg.norm(best)
-
-
-def corners_of(case: dict[str, Any]) -> np.ndarray | None:
+def corners_of(shape: dict[str, Any]) -> np.ndarray | None:
     """World coordinates of the vertices of a shape that has them."""
-    shape = shape_of(case)
-    rotation, position = pose_of(case)
-    if isinstance(shape, gs.Box):
-        local = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * shape.half_extents
-    elif hasattr(shape, "vertices"):
-        local = shape.vertices
+    solid = shape_of(shape)
+    rotation, position = pose_of(shape)
+    if isinstance(solid, gs.Box):
+        local = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * solid.half_extents
+    elif hasattr(solid, "vertices"):
+        local = solid.vertices
     else:
         return None
     return local @ rotation.T + position
 
 
-def size_of(case: dict[str, Any], other: dict[str, Any]) -> float:
-    """Largest number of the scene relative to the other shape's position: what rounding of the pose scales with."""
-    corners = corners_of(case)
-    reach = np.abs(corners - pose_of(other)[1]).max() if corners is not None else 0.0
-    numbers = [np.abs(np.ravel(v)).max() for k, v in case.items() if k in ("radius", "length", "size", "offset")]
-    return max([1e-3, float(reach), float(np.abs(pose_of(case)[1] - pose_of(other)[1]).max()), *numbers])
+@pytest.mark.parametrize("name", CASES)
+def test_answer(name: str) -> None:
+    """Numbers to the slack of the verified value, booleans wherever that slack leaves them to be seen."""
+    case, record = CASES[name], RECORDS[name]
+    assert case.truth is not None
+    expected = record["verified_value"]
+    for tier in TIERS:
+        finding = judge(case, tier)
+        assert finding is not None and finding.near, (tier, finding)
+        assert finding.verdict == (Verdict.RIGHT if case.truth.decidable else finding.verdict) != Verdict.WRONG
+        for want, value in (("penetration", expected), ("distance", max(0.0, expected))):
+            answer = gs.distance(*case.bodies, accuracy=tier, want=(want,))
+            assert answer.status == gs.DistanceStatus.OK
+            assert abs(answer.distance[0] - value) <= slack_of(case)
 
 
-DISTANCES = [
-    case
-    for kind in ("signed_distance", "distance")
-    for case in field_cases(kind)
-    if all(shape["type"] in KERNELS and "rounding" not in shape for shape in case["shapes"])
-    and case["verified_value"] is not None
+def slack_of(case: Case) -> float:
+    """Half the width of what is known, as a number and not as a signed square."""
+    truth = case.truth
+    assert truth is not None
+    low, high = (float(abs(x)) ** 0.5 * (1 if x > 0 else -1) for x in (truth.low, truth.high))
+    return (high - low) / 2 + 4 * np.spacing(max(abs(low), abs(high)))
+
+
+CORNERED = [
+    name
+    for name, case in CASES.items()
+    if len(case.bodies) == 3 and all(corners_of(shape) is not None for shape in RECORDS[name]["shapes"])
 ]
 
 
-@pytest.mark.parametrize("case", DISTANCES, ids=[case["id"] for case in DISTANCES])
-def test_distance(case: dict[str, Any]) -> None:
-    first, second = case["shapes"]
-    (rotation_a, position_a), (rotation_b, position_b) = pose_of(first), pose_of(second)
-    pose = np.concatenate([rotation_a.T @ (position_b - position_a), quaternion_of(rotation_a.T @ rotation_b)])
-    size = max(size_of(first, second), size_of(second, first))
-    # A quaternion cannot say how far a matrix is off orthonormal; the verified values take the matrices as given.
-    defect = max(np.abs(r.T @ r - np.eye(3)).max() for r in (rotation_a, rotation_b))
-    tolerance = (TOLERANCE + 2 * defect) * size
-    expected = case["verified_value"]
-    signed = gs.distance(shape_of(first), shape_of(second), pose, want=("distance", "penetration"))
-    assert signed.status == gs.DistanceStatus.OK
-    if case["kind"] == "signed_distance":
-        assert abs(signed.distance[0] - expected) <= tolerance
-        assert signed.lower[0] - tolerance <= expected <= signed.upper[0] + tolerance
-    plain = gs.distance(shape_of(first), shape_of(second), pose)
-    assert abs(plain.distance[0] - max(0.0, case.get("verified_distance", expected))) <= tolerance
-    if abs(expected) > tolerance:
-        assert gs.intersects(shape_of(first), shape_of(second), pose).value == (expected < 0.0)
-    corners = corners_of(first), corners_of(second)
-    if case["kind"] == "signed_distance" and corners[0] is not None and corners[1] is not None:
-        # World coordinates take the matrices as given, and are rounded to the ulps of the far corner.
-        world = gs.distance(*(gs.Polytopes.from_list([c]) for c in corners), want=("penetration",))
-        assert abs(world.distance[0] - expected) <= TOLERANCE * size + 1e-15 * max(np.abs(c).max() for c in corners)
+@pytest.mark.parametrize("name", CORNERED)
+def test_in_world_coordinates(name: str) -> None:
+    """Corners take the matrices as given and are rounded to the ulps of the far one; then the oracle is the judge."""
+    shapes = RECORDS[name]["shapes"]
+    corners = [corners_of(shape) for shape in shapes]
+    bodies = [gs.Polytopes.from_list([c]) for c in corners]
+    exact = polytope.separation(*corners).signed_square if len(corners[0]) * len(corners[1]) <= 100 else None
+    reach = max(np.abs(c).max() for c in corners)
+    for tier in TIERS:
+        answer = gs.distance(*bodies, accuracy=tier, want=("penetration",))
+        slack = VERIFIED * scene_size(shapes) + 1e-15 * reach
+        assert abs(answer.distance[0] - RECORDS[name]["verified_value"]) <= slack
+        if exact is not None:
+            bounds = (answer.distance[0], answer.lower[0], answer.upper[0])
+            truth = _verdict.Truth(exact, exact, Fraction(scene_size(shapes)), False)
+            finding = _verdict._number("distance", answer, truth, tier)
+            assert finding.verdict != Verdict.WRONG, (bounds, finding)
+            assert tier != "exact" or finding.verdict == Verdict.RIGHT, (bounds, finding)
 
 
-def test_enough_distance_cases() -> None:
-    assert len(DISTANCES) >= 120
-    assert sum(case["verified_value"] < 0 for case in DISTANCES) >= 40
+def test_enough_cases() -> None:
+    values = [RECORDS[name]["verified_value"] for name in CASES]
+    assert len(CASES) >= 169 and sum(value < 0 for value in values) >= 50
+    assert len(CORNERED) >= 100
+    visible = {RECORDS[name]["verified_visible"] for name, case in CASES.items() if case.kind == "frustum_cull"}
+    assert visible == {True, False}
+    assert sum(isinstance(case.bodies[0], gs.Frustum) for case in CASES.values()) >= 6
 
 
-CULLS = [case for case in field_cases("frustum_cull") if "aspect" in case["frustum"] and "hfov" in case["frustum"]]
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.kind == "frustum_cull"])
+def test_cull(name: str) -> None:
+    view, boxes = CASES[name].bodies[:2]
+    if isinstance(view, gs.Frustum) and CASES[name].truth.decidable:
+        for tier in TIERS:
+            answer = gs.cull(view, boxes, accuracy=tier)
+            assert answer.certain and (answer.state != gs.OUTSIDE) == RECORDS[name]["verified_visible"]
 
 
-@pytest.mark.parametrize("case", CULLS, ids=[case["id"] for case in CULLS])
-def test_cull(case: dict[str, Any]) -> None:
-    given, (hull, box) = case["frustum"], case["shapes"]
-    eye = np.array(given["pos"], dtype=float)
-    fov_y = 2.0 * math.atan(math.tan(given["hfov"] / 2.0) / given["aspect"])
-    camera = gs.Frustum.look_at(eye, eye + [1, 0, 0], [0, 0, 1], fov_y, given["aspect"], given["near"], given["far"])
-    nearest = np.abs(camera.corners()[:, None] - np.array(hull["vertices"])[None]).max(axis=2).min(axis=1)
-    assert nearest.max() < 1e-12  # it is the frustum of the case
-    rotation, position = pose_of(box)
-    boxes = gs.Boxes(position[None], rotation.T[None], np.array([box["size"]]) / 2.0)
-    answer = gs.cull(camera, boxes)
-    assert answer.certain and (answer.state != gs.OUTSIDE) == case["verified_visible"]
-    gap = gs.distance(camera, boxes, want=("penetration",))
-    assert abs(gap.distance[0] - case["verified_value"]) <= TOLERANCE * given["far"]
+def test_the_page_lists_what_is_missing() -> None:
+    """`make hard` writes it; it shrinks as queries and shapes arrive."""
+    text = PAGE.read_text(encoding="utf-8")
+    listed = text.partition("<!-- missing: begin -->\n")[2].partition("\n<!-- missing: end -->")[0]
+    assert listed == missing()
 
 
 # Prisms that move across their height: the axis along it, and the case.
@@ -167,8 +146,4 @@ def test_first_contact(name: str) -> None:
         return
     assert answer.status == (gs.WILL_TOUCH if expected > 0 else gs.OVERLAPPING)
     assert answer.time_lower[0] <= answer.time[0] <= answer.time_upper[0]
-    assert abs(answer.time[0] - expected) <= TOLERANCE * max(1.0, expected)
-
-
-def test_enough_cull_cases() -> None:
-    assert {case["verified_visible"] for case in CULLS} == {True, False}
+    assert abs(answer.time[0] - expected) <= VERIFIED * max(1.0, expected)

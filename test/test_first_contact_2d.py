@@ -650,6 +650,16 @@ def test_needles_meet_tip_to_tip(width):
     assert set_distance(answer.points, [(0.0, 0.0)]) == 0.0
 
 
+@pytest.mark.parametrize("width", [1e-290, 1e-308, 1e-320])
+def test_needles_cut_off_bluntly(width):
+    """The edge across the tip is all that bounds the needle there, however short it is."""
+    a = [(0.0, -width), (1e6, -1e-9), (1e6, 1e-9), (0.0, width)]
+    b = [(-2.0 - x, -y) for x, y in a]
+    answer = contact(a, b, (0, 0), (1.0, 0.0))
+    assert answer.status[0] == gs.WILL_TOUCH and answer.time[0] == 2.0
+    assert contact(a, b, (0, 0), (0.0, 1.0)).status[0] == gs.NEVER
+
+
 def test_misses_beyond_the_tip_of_a_needle_are_seen():
     """Near a sharp tip every edge normal sees a gap far below rounding; the tip's own axis sees all of it."""
     needle = [(0.0, 0.0), (1e6, -1e-6), (1e6, 1e-6)]
@@ -677,6 +687,77 @@ def test_differences_beyond_the_doubles():
     assert answer.time[0] == pytest.approx(2.0) and len(answer.points) == 2
     answer = contact([(x / 8, y / 8) for x, y in a], [(x / 8, y / 8) for x, y in b], (big, 0.0), (-big, 0.0))
     assert answer.time[0] == pytest.approx(0.0625)
+
+
+# Powers of two from the smallest double to the largest: 2^-1063 is 1e-320, 2^996 is 7e299.
+EXTREMES = [-1074, -1070, -1063, -1022, -1000, -537, -200, 0, 500, 996, 1000, 1020]
+
+
+def extreme_pairs(rng, exponent, count):
+    """Rings of small whole multiples of 2^exponent, most of them near each other."""
+    for _ in range(count):
+        a, b = random_ring(rng, 4), random_ring(rng, 4)
+        offset = rng.integers(-4, 5, 2) * int(rng.random() < 0.7)
+        yield tuple([(math.ldexp(x, exponent), math.ldexp(y, exponent)) for x, y in ring]
+                    for ring in (a, shifted(b, *map(int, offset))))  # fmt: skip
+
+
+def check_corners(answer, truth, size, given):
+    """The contact set, up to roundings of the scene and whole multiples of 2^-1074."""
+    corners = [[float(c) for c in p] for p in truth.contact]
+    finest = 2.0 * 2.0**-1074
+    assert len(answer.points) > 0 and np.isfinite(answer.points).all(), given
+    off = [np.abs(np.subtract(corners, p)).max(axis=1).min() for p in answer.points]
+    assert max(off) <= 2.0**-46 * size + finest, given
+    if size >= 2.0**-1000:  # else corners are rounded into others, or into the line between others
+        assert len(answer.points) == len(corners), given
+
+
+@pytest.mark.parametrize("exponent", EXTREMES)
+def test_at_relative_rest_contact_is_now_or_never(rng, exponent):
+    reached = Counter()
+    for a, b in extreme_pairs(rng, exponent, 120):
+        velocity = rng.choice([0.0, 1.0, 0.1, 5e-324, 1e300], 2)
+        t_max = float(rng.choice([0.0, 5e-324, 1e-300, 1.0, 1e300, INF]))
+        answer = contact(a, b, velocity, velocity, t_max=t_max)
+        truth = exact.first_contact(a, (0, 0), b, (0, 0), t_max)
+        given = reproducer(a=a, b=b, velocity=velocity, t_max=t_max)
+        assert answer.status[0] == STATUS[truth.status] != gs.WILL_TOUCH, given
+        reached[truth.status] += 1
+        if truth.hits:
+            assert answer.time[0] == 0.0 and answer.last_time[0] == t_max, given
+            check_corners(answer, truth, np.abs(np.array(a + b)).max(), given)
+    assert min(reached[k] for k in ("NEVER", "TOUCHING", "OVERLAPPING")) >= 5, reached
+
+
+@pytest.mark.parametrize("exponent", EXTREMES)
+def test_moving_bodies_of_extreme_size(rng, exponent):
+    """At speeds in proportion to the size, and so fast or slow that times are far from one second."""
+    reached = Counter()
+    for a, b in extreme_pairs(rng, exponent, 120):
+        speed = int(np.clip(exponent + rng.choice([0, -500, 500, 1100]), -1074, 1018))
+        way = np.mean(np.ldexp(a, -exponent), axis=0) - np.mean(np.ldexp(b, -exponent), axis=0)
+        way = np.round(way / np.abs(way).max() * 8.0) if way.any() else np.ones(2)
+        velocity = tuple(math.ldexp(c, speed) for c in way)
+        answer = contact(a, b, (0, 0), velocity)
+        truth = exact.first_contact(a, (0, 0), b, velocity, INF)
+        given = reproducer(a=a, b=b, velocity=velocity)
+        assert answer.status[0] == STATUS[truth.status], given
+        reached[truth.status] += 1
+        if truth.hits:
+            assert Fraction(answer.time_lower[0]) <= truth.time <= Fraction(answer.time_upper[0]), given
+            assert answer.time[0] == pytest.approx(float(truth.time), rel=TIME_ERROR, abs=5e-324), given
+            check_corners(answer, truth, np.abs(np.array(a + b)).max(), given)
+    assert min(reached["WILL_TOUCH"], reached["OVERLAPPING"]) >= 5, reached
+
+
+def test_tiny_bodies_on_a_far_line():
+    """One coordinate is the same all over the pair and overflows in units of its size."""
+    a, b = [(1e10, 0.0)], [(1e10, 2e-300)]
+    answer = contact(a, b, (1.0, 0.0), (1.0, -1e-300))
+    assert answer.time[0] == pytest.approx(2.0) and answer.points.tolist() == [[1e10 + 2.0, 0.0]]
+    answer = contact([*a, *b], [(1e10, 1e-300), (1e10, 3e-300)])
+    assert answer.points[:, 0].tolist() == [1e10, 1e10]
 
 
 # ------------------------------------------------------------------------------------------------------ batch

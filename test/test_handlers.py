@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
@@ -16,6 +17,7 @@ from geomsrv.config import Config
 from geomsrv.engine import Engine
 from geomsrv.ros import convert
 from geomsrv.ros.handlers import Handlers
+from geomsrv.verify import verify_lines
 
 OK, BAD_REQUEST, UNSUPPORTED, NOT_AVAILABLE, NOT_ACTIVE, INTERNAL_ERROR = range(6)
 BY_IDS, INLINE, ALL = range(3)
@@ -356,6 +358,88 @@ def test_first_contact_batch(desk) -> None:
         velocities_b=D([0, 0, 0]),
     )
     assert solid.status == UNSUPPORTED and "polytopes" in solid.message and solid.item_status.tolist() == [4]
+
+
+# --------------------------------------------------------------------------------------------------- certificates
+
+
+def claims(answer) -> list[dict]:
+    """What the certificates of an answer claim; all of it is proven."""
+    assert [fault for _, _, fault in verify_lines(answer.certificates)] == [""] * len(answer.certificates)
+    return [json.loads(line)["claim"] for line in answer.certificates]
+
+
+BOX_AND_BALL = {"shapes_a": shapes(gs.Box([1, 1, 1])), "poses_a": at((5, 5, 5)), "shapes_b": shapes(gs.Sphere(0.5))}
+BATCH_OF_BOXES = {"kind_a": 101, "values_a": D([0, 0, 0, *np.eye(3).ravel(), 1, 1, 1]), "kind_b": 101}
+RINGS = {"vertices_a": D([0, 0, 1, 0, 0, 1]), "offsets_a": convert.uint32s([0, 3])}
+CERTIFIED = {
+    "distance by ids": (
+        "Distance",
+        {"ids_a": ["box", "left", "left", "cone"], "ids_b": ["ball", "right", "ball", "box"]},
+        [1, 1, 0, 0],
+    ),
+    "distance to the nearest": ("Distance", {"ids_a": ["box", "far"]}, [1, 1]),
+    "distance inline": ("Distance", {"select": INLINE, "poses_b": at((9, 5, 5)), **BOX_AND_BALL}, [1]),
+    "depth inline": (
+        "Distance",
+        {"select": INLINE, "poses_b": at((5, 5, 5)), "want": ["penetration"], **BOX_AND_BALL},
+        [1],
+    ),
+    "first contact": ("FirstContact", {"ids_a": ["left", "box"], "ids_b": ["right", "ball"], "horizon": 5.0}, [1, 0]),
+    "cull by ids": ("Cull", {"ids": ["far", "box", "ball"]}, [0, 1, 0]),
+    "cull all": ("Cull", {"select": ALL}, [0, 1, 0, 0, 0, 0]),
+    "cull inline": ("Cull", {"select": INLINE, "shapes": shapes(gs.Box([1, 1, 1])), "poses": at((0, 0, 0))}, [1]),
+    "cull batch": (
+        "CullBatch",
+        {"frustum": D(CAMERA.packed()), "centers": D([0, 0, 0]), "axes": D(np.eye(3)), "half_extents": D([1, 1, 1])},
+        [1],
+    ),
+    "distance batch": ("DistanceBatch", {"values_b": D([4, 0, 0, *np.eye(3).ravel(), 1, 1, 1]), **BATCH_OF_BOXES}, [1]),
+    "points batch": (
+        "DistanceBatch",
+        {"kind_a": 104, "values_a": D(CAMERA.packed()), "kind_b": 105, "values_b": D([0, 0, 0, 9, 9, 9])},
+        [1, 1],
+    ),
+    "first contact batch": (
+        "FirstContactBatch",
+        {"vertices_b": D([3, 0, 4, 0, 3, 1]), "offsets_b": convert.uint32s([0, 3]), **RINGS}
+        | {"velocities_a": D([1, 0]), "velocities_b": D([0, 0]), "t_max": math.inf},
+        [1],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CERTIFIED)
+def test_answers_come_with_certificates(desk, name) -> None:
+    service, fields, claimed = CERTIFIED[name]
+    got, bare = desk.ask(service, **fields, certificates=True), desk.ask(service, **fields)
+    assert got.status in (OK, UNSUPPORTED), got.message
+    assert [bool(claim) for claim in claims(got)] == [bool(x) for x in claimed]
+    # Nothing else changes.
+    assert len(bare.certificates) == 0
+    for field in vars(got).keys() - {"certificates", "cost"}:
+        assert str(getattr(got, field)) == str(getattr(bare, field)), field
+
+
+def test_certificates_say_what_the_answer_says(desk) -> None:
+    got = desk.ask("Distance", ids_a=["ball"], ids_b=["box"], certificates=True)
+    (claim,) = claims(got)
+    assert got.lower[0] <= float.fromhex(claim["lower"]) <= 0.5 <= float.fromhex(claim["upper"]) <= got.upper[0]
+    (state,) = claims(desk.ask("Cull", ids=["box"], certificates=True))
+    assert state == {"state": "INSIDE"}
+
+
+def test_objects_that_may_be_elsewhere_are_not_certified(desk) -> None:
+    desk.engine.apply(gs.SceneUpdate(add=[obj("left", SQUARE, velocity=(1, 0, 0), uncertainty=1e-3)]))
+    assert claims(desk.ask("FirstContact", ids_a=["left"], ids_b=["right"], certificates=True)) == [{}]
+    desk.engine.apply(gs.SceneUpdate(add=[obj("box", gs.Box([1, 1, 1]), uncertainty=1e-3)]))
+    assert claims(desk.ask("Cull", ids=["box"], certificates=True)) == [{}]
+
+
+@pytest.mark.parametrize("service", ["Distance", "FirstContact"])
+def test_certificates_of_all_pairs_are_not_available(desk, service) -> None:
+    got = desk.ask(service, select=ALL, certificates=True)
+    assert got.status == NOT_AVAILABLE and "certificates are given for listed pairs" in got.message and is_empty(got)
 
 
 # ---------------------------------------------------------------------------------------------------------- scene

@@ -37,7 +37,7 @@ PYTHON_LAYERS = {
     "scene": ("geomsrv/*.py", ("numpy",)),
     "query": (
         "geomsrv/queries.py geomsrv/shapes.py geomsrv/answers.py geomsrv/_validate.py geomsrv/errors.py "
-        "geomsrv/_version.py",
+        "geomsrv/certificates.py geomsrv/evidence.py geomsrv/verify.py geomsrv/_version.py",
         ("numpy",),
     ),
     "engine": ("geomsrv/_core.pyi", ("numpy",)),
@@ -45,13 +45,13 @@ PYTHON_LAYERS = {
 
 # Optional peers, imported on use.  "*" marks a file that may choose the module's name at run time.
 OPTIONAL = {
-    "geomsrv/fcl_worker.py": ("fcl",),
+    "geomsrv/fcl_worker.py": ("coal", "fcl"),
     "geomsrv/robot.py": ("*",),
 }
 
 # The C++ includes: its own directories by their path from src, the standard library by names without a dot.
 CPP_LAYERS = {
-    "src/bind/*": ("bind/*", "geom/*", "nanobind/*"),
+    "src/bind/*": ("bind/*", "geom/*", "nanobind/*", "sys/mman.h"),
     "src/geom/*": ("geom/*", "boost/multiprecision/cpp_int.hpp"),
 }
 VECTOR_INTRINSICS = ("immintrin.h",)

@@ -366,9 +366,9 @@ def test_with_tf2_other_frames_are_transformed(monkeypatch) -> None:
 
     tf2.Buffer, tf2.TransformListener = Buffer, lambda buffer, node: None
     monkeypatch.setitem(sys.modules, "tf2_ros", tf2)
-    client = Client("framed")
+    client = Client("framed", "/framed/geomsrv")
     try:
-        with running_node(max_rate=1000.0) as node:
+        with running_node("/framed", max_rate=1000.0) as node:
             add = [body("a", gs.Sphere(0.5), (1, 0, 0), (1, 0, 0), frame="arm"), body("b", gs.Sphere(0.5), frame="leg")]
             got = client.call(srv.ApplyScene, "apply_scene", update=msg.SceneUpdate(add=add))
             assert got.ids == ["b"] and "'leg'" in got.faults[0] and "no leg" in got.faults[0]

@@ -16,10 +16,14 @@ from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, s
 
 import geomsrv as gs
 
+INF = math.inf
+
 # Bounds are a few units in the last place apart.  Only where polygons are apart or overlap by less than rounding of
 # twice the precision, 2^-100 of their size, does the number itself have fewer digits.
 WIDTH = 2.0**-49
 RESOLUTION = 2.0**-96
+# Subnormal coordinates are rounded to whole multiples of 2^-1074; no point or product here counts more than 4 of them.
+FINEST = 4 * 2.0**-1074
 
 
 def below_root(x, square):
@@ -241,6 +245,64 @@ def batch(rng):
 
 def signed(pairs):
     return gs.distance(polygons(*(a for a, _ in pairs)), polygons(*(b for _, b in pairs)), want=("penetration",))
+
+
+def nudged(rng, ring):
+    """The ring with every coordinate moved by up to four ulps; zeros become subnormal."""
+    for _ in range(4):
+        way = np.where(rng.random((len(ring), 2)) < 0.3, rng.choice([-INF, INF], (len(ring), 2)), ring)
+        ring = np.nextafter(ring, way)
+    return ring
+
+
+def nearly_parallel_pairs(rng, count, unit):
+    """Pairs that share the directions of their edges up to a few ulps, at any offset, and how they differ."""
+    for _ in range(count):
+        size = int(rng.integers(1, 6))
+        a = SQUARE if rng.random() < 0.3 else random_ring(rng, size)
+        sign = rng.choice([-1, 1])
+        stretch = rng.integers(1, 4, 2) if a is SQUARE else np.full(2, rng.integers(1, 4))
+        b = sign * stretch * np.array(a) + rng.integers(-2 * size, 2 * size + 1, 2)
+        yield tuple(hull(nudged(rng, unit * np.array(ring, float))) for ring in (a, b))
+
+
+def repeated(rng, ring):
+    return [v for v in ring for _ in range(int(rng.integers(1, 3)))]
+
+
+@pytest.mark.parametrize("exponent", [-1060, -1000, -30, 0, 30, 1000])
+def test_law_witnesses_of_nearly_parallel_edges_face_each_other(rng, exponent):
+    pairs = [tuple(repeated(rng, ring) for ring in pair) for pair in nearly_parallel_pairs(rng, 600, 2.0**exponent)]
+    answer = signed(pairs)
+    reached = Counter(np.sign(answer.distance).astype(int).tolist())
+    off = np.abs(answer.point_b - answer.point_a - answer.distance[:, None] * answer.normal).max(axis=1)
+    for i, pair in enumerate(pairs):
+        assert off[i] <= 2.0**-49 * largest(*pair) + FINEST, reproducer(a=pair[0], b=pair[1])
+        for point, ring in ((answer.point_a[i], pair[0]), (answer.point_b[i], pair[1])):
+            away = exact.separation([tuple(map(float, point))], ring).signed_square
+            assert away <= Fraction(2.0**-49 * largest(*pair) + FINEST) ** 2, reproducer(a=pair[0], b=pair[1])
+    assert min(reached[-1], reached[1]) >= 100, reached
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0**1000])
+def test_distances_whose_squares_underflow(size):
+    """Two tips so near to each other that nothing but their coordinates tells them apart."""
+    a = [(0.0, 0.0), (-size, 2.0 * size), (-size, -2.0 * size)]
+    b = [(3e-200, -4e-200), (size, -2.0 * size), (size, 2.0 * size)]
+    answer = signed([(a, b)])
+    assert answer.distance[0] == pytest.approx(5e-200, rel=2.0**-52)
+    np.testing.assert_allclose(answer.normal[0], [0.6, -0.8], rtol=2.0**-52)
+    assert answer.lower[0] <= answer.distance[0] <= answer.upper[0]
+
+
+def test_edges_parallel_beyond_all_digits():
+    """The foot of the lowest vertex is beyond the edge, and the edge it is an end of tilted by 2^-1074."""
+    a = [(0, 0), (0, 0), (0.5, 0), (1, 0), (1, 0), (1, 0.5), (1, 1), (0, 1), (0, 0.25)]
+    tilted = [(0.0, -1.0 + 2.0**-53), (1.0, -1.0 + 2.0**-52), (1.0, 1.0 - 2.0**-53), (2.0**-1073, 1.0 + 2.0**-51)]
+    for pair in ((a, tilted), (tilted, a)):
+        answer = signed([pair])
+        check(answer, 0, *pair)
+        assert answer.distance[0] == -1.0
 
 
 def test_law_swap(batch):

@@ -553,24 +553,30 @@ QUERIES: dict[str, Callable[..., Any]] = {
 }
 
 
+TIERS_ANSWERED = {"cull": ("bound", "float32", "exact")}  #: besides float64
+
+
 @pytest.mark.parametrize("query", QUERIES)
 def test_tiers_that_are_not_available_are_named(query: str) -> None:
     for tier in ("bound", "float32", "exact"):
+        if tier in TIERS_ANSWERED.get(query, ()):
+            assert QUERIES[query](accuracy=tier).cost.accuracy == tier
+            continue
         with pytest.raises(NotAvailableError, match=f"^accuracy='{tier}' is not available yet") as caught:
             QUERIES[query](accuracy=tier)
         assert isinstance(caught.value, NotImplementedError) and isinstance(caught.value, GeometryError)
     assert QUERIES[query](accuracy="float64").cost.accuracy == "float64"
 
 
-@pytest.mark.parametrize("query", [name for name in QUERIES if not name.startswith(("distance.", "intersects"))])
-def test_certificates_are_not_available(query: str) -> None:
-    if query == "distance":
-        with pytest.raises(TypeError):  # no such argument, no such promise
-            QUERIES[query](certificates=True)
-        return
-    with pytest.raises(NotAvailableError, match="^certificates=True is not available yet"):
-        QUERIES[query](certificates=True)
-    QUERIES[query](certificates=False)
+@pytest.mark.parametrize("query", QUERIES)
+def test_certificates_need_a_tier_that_leaves_something_to_prove(query: str) -> None:
+    for tier in ("bound", "float32"):
+        with pytest.raises(GeometryError, match="^certificates need accuracy float64 or exact|is not available yet"):
+            QUERIES[query](accuracy=tier, certificates=True)
+    assert QUERIES[query](certificates=False).certificates is None
+    answer = QUERIES[query](certificates=True)
+    assert len(answer.certificates) == len(list(answer.certificates)) > 0
+    gs.verify(answer)
 
 
 # ------------------------------------------------------------------------------------------- good input

@@ -22,6 +22,7 @@ from geomsrv.answers import ContactStatus, Cost, DistanceStatus
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
 from geomsrv.pairwise import Bodies, ListedContacts, distance_of_two, listed_distances, listed_first_contacts, world_of
+from geomsrv.proofs import contact_certificates, cull_certificates, distance_certificates
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
@@ -183,21 +184,25 @@ class Handlers:
             _unused(request, "ids")
             start, counts = time.perf_counter_ns(), Counter[str]()
             world = world_of(_bodies(request.shapes, request.poses, ()))
-            state, certain, boxed = sight(world, np.arange(len(world)), frustum, counts)
+            rows = np.arange(len(world))
+            state, certain, boxed = sight(world, rows, frustum, counts)
             message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
             cost = Cost(time.perf_counter_ns() - start, accuracy, dict(counts))
         elif request.select in (BY_IDS, ALL):
             _unused(request, "shapes", "poses", *(("ids",) if request.select == ALL else ()))
             answer = scene.cull(frustum, ids=None if request.select == ALL else request.ids, accuracy=accuracy)
             state, certain, message, cost = answer.state, answer.certain, answer.message, answer.cost
-            ids = answer.ids
+            ids, world = answer.ids, scene.world
             if request.select == BY_IDS and ids != request.ids:
                 row, ids = {name: i for i, name in enumerate(ids)}, request.ids
                 order = np.array([row[name] for name in ids], dtype=np.intp)
                 state, certain = state[order], certain[order]
+            rows = np.array([world.index[name] for name in ids], dtype=np.int64)
             response.ids, response.scene_version = ids, answer.version
         else:
             raise GeometryError(f"select must be BY_IDS, INLINE or ALL, got {request.select}")
+        if request.certificates:
+            response.certificates = list(cull_certificates(world, rows, frustum, accuracy=accuracy))
         response.message = message
         response.states, response.certain = convert.bytes_(state), convert.bytes_(certain)
         convert.set_cost(response.cost, cost)
@@ -210,9 +215,14 @@ class Handlers:
         want = self._want(request, "distance", "witness", "penetration")
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE)
+            _listed_only(request)
             self._all_distances(request, response, want, accuracy)
             return
-        if request.select == INLINE and len(request.shapes_a) == 1 == len(request.shapes_b):
+        if (
+            request.select == INLINE
+            and len(request.shapes_a) == 1 == len(request.shapes_b)
+            and not request.certificates
+        ):
             _unused(request, *_BY_IDS)
             if self._distance_of_two(request, response, want, accuracy):
                 return
@@ -223,6 +233,8 @@ class Handlers:
             (world, pairs), lonely = self._listed(request), ""
         answer = listed_distances(world, pairs, want=want, accuracy=accuracy)
         self.engine.check(world, pairs, answer)
+        if request.certificates:
+            response.certificates = list(distance_certificates(world, pairs, want=want, accuracy=accuracy))
         if request.select == BY_IDS:
             _set_ids(response, world, pairs)
         _set_distances(response, answer, want)
@@ -284,6 +296,7 @@ class Handlers:
         answer: PairContacts | ListedContacts
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE, "twists_a", "twists_b")
+            _listed_only(request)
             answer = self.engine.scene.first_contacts(request.horizon, accuracy=accuracy)
             order = np.argsort(answer.time, kind="stable")
             response.ids_a = [answer.ids_a[i] for i in order.tolist()]
@@ -293,6 +306,9 @@ class Handlers:
             world, pairs = self._listed(request, moving=True)
             answer = listed_first_contacts(world, pairs, request.horizon, accuracy=accuracy)
             order = np.arange(len(pairs))
+            if request.certificates:
+                lines = contact_certificates(world, pairs, request.horizon, accuracy=accuracy)
+                response.certificates = list(lines)
             if request.select == BY_IDS:
                 _set_ids(response, world, pairs)
         _set_first_contacts(response, answer, order, want)
@@ -309,8 +325,9 @@ class Handlers:
             convert.rows(request.axes, "axes", 9).reshape(-1, 3, 3),
             convert.rows(request.half_extents, "half_extents", 3),
         )
-        answer = queries.cull(frustum, boxes, accuracy=accuracy)
+        answer = queries.cull(frustum, boxes, accuracy=accuracy, certificates=request.certificates)
         response.states, response.certain = convert.bytes_(answer.state), convert.bytes_(answer.certain)
+        _set_certificates(response, answer)
         convert.set_cost(response.cost, answer.cost)
 
     @_answered()
@@ -323,20 +340,22 @@ class Handlers:
             for s in "ab"
         ]
         a, b = sides
+        options: dict[str, Any] = {"accuracy": accuracy, "want": want, "certificates": request.certificates}
         if isinstance(b, np.ndarray):
             if not isinstance(a, Frustum):
                 raise GeometryError("kind_b POINTS needs kind_a FRUSTUM")
             _unused(request, "poses_ab")
-            answer = queries.distance_to_frustum(a, b, accuracy=accuracy, want=want)
+            answer = queries.distance_to_frustum(a, b, **options)
         elif min(request.kind_a, request.kind_b) >= BOXES:
             _unused(request, "poses_ab")
-            answer = queries.distance(a, b, accuracy=accuracy, want=want)
+            answer = queries.distance(a, b, **options)
         elif max(request.kind_a, request.kind_b) < BOXES:
             poses = convert.rows(request.poses_ab, "poses_ab", 7)
-            answer = queries.distance(a, b, poses, accuracy=accuracy, want=want)
+            answer = queries.distance(a, b, poses, **options)
         else:
             raise GeometryError("kind_a and kind_b must both be batches, or both be shapes of Shape.msg")
         _set_distances(response, answer, want)
+        _set_certificates(response, answer)
         if answer.region is not None:
             response.region = convert.bytes_(answer.region)
         _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message)
@@ -363,9 +382,16 @@ class Handlers:
             rows = convert.rows(getattr(request, name), name, dimension)
             velocities.append(rows[0] if len(rows) == 1 else rows)
         answer = queries.first_contact(
-            a, b, *velocities, t_max=request.t_max, accuracy=accuracy, contact_set="contact_set" in want
+            a,
+            b,
+            *velocities,
+            t_max=request.t_max,
+            accuracy=accuracy,
+            contact_set="contact_set" in want,
+            certificates=request.certificates,
         )
         _set_first_contacts(response, answer, np.arange(len(answer.status)), want)
+        _set_certificates(response, answer)
         _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
 
     # ---------------------------------------------------------------------------------------------------- requests
@@ -442,6 +468,11 @@ def _unused(request: Any, *names: str) -> None:
     for name in names:
         if len(getattr(request, name)):
             raise GeometryError(f"{name} must be empty here")
+
+
+def _listed_only(request: Any) -> None:
+    if request.certificates:
+        raise NotAvailableError("certificates are given for listed pairs, not for all")
 
 
 def _rows_of(world: World, ids: Sequence[str], name: str) -> Sequence[int]:
@@ -525,6 +556,11 @@ def _set_distances(response: Any, answer: Any, want: tuple[str, ...]) -> None:
     for name in _distance_columns(want):
         setattr(response, name, convert.doubles(getattr(answer, name)))
     convert.set_cost(response.cost, answer.cost)
+
+
+def _set_certificates(response: Any, answer: Any) -> None:
+    if answer.certificates is not None:
+        response.certificates = list(answer.certificates.lines())
 
 
 def _set_first_contacts(response: Any, answer: Any, order: IntArray, want: tuple[str, ...]) -> None:

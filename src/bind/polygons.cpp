@@ -1,12 +1,20 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <memory>
 #include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/polygon.hpp"
+#include "geom/polygon_bound.hpp"
 #include "geom/polygon_distance.hpp"
+#include "geom/polygon_distance_exact.hpp"
 #include "geom/polygon_first_contact.hpp"
+#include "geom/polygon_first_contact_exact.hpp"
 
 namespace geomsrv::bind {
 
@@ -36,6 +44,8 @@ private:
 /// Item i of n, or the only one.
 constexpr std::size_t item(std::size_t count, std::size_t i) { return count == 1 ? 0 : i; }
 
+std::size_t pair_count(const Rings& a, const Rings& b) { return a.size() == 1 ? b.size() : a.size(); }
+
 std::size_t largest_ring(const Rings& rings) {
     std::size_t largest = 1;
     for (std::size_t i = 0; i < rings.size(); ++i) {
@@ -58,6 +68,9 @@ constexpr std::string_view fault_text(RingFault fault) {
     return "";
 }
 
+/// How many items each rung answered.
+using RungCounts = std::array<std::int64_t, 4>;
+
 struct ContactRows {
     std::uint8_t* status;
     double* time;
@@ -66,23 +79,35 @@ struct ContactRows {
     double* last_time;
     Vec2* normal;
     std::int64_t* point_offsets;
+    bool* certain;
+};
+
+struct MovingRings {
+    Rings rings;
+    const Vec2* velocity;
+    std::size_t velocities;
+
+    MovingRings(const Rows2& vertices, const Offsets& offsets, const Rows2& velocity_rows)
+        : rings(vertices, offsets),
+          velocity(reinterpret_cast<const Vec2*>(velocity_rows.data())),
+          velocities(velocity_rows.shape(0)) {}
+
+    [[nodiscard]] MovingPolygon operator[](std::size_t i) const {
+        return {rings[item(rings.size(), i)], velocity[item(velocities, i)]};
+    }
 };
 
 /// Fills the rows and returns the contact points of all pairs, end to end.
-std::vector<Vec2> first_contacts(const Rings& a, const Rings& b, const Rows2& velocity_a,
-                                 const Rows2& velocity_b, double t_max, bool contact_set,
-                                 const ContactRows& rows) {
-    const std::size_t count = a.size() == 1 ? b.size() : a.size();
-    const auto* const va = reinterpret_cast<const Vec2*>(velocity_a.data());
-    const auto* const vb = reinterpret_cast<const Vec2*>(velocity_b.data());
+template <class Solver>
+std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, double t_max, bool contact_set,
+                                 const ContactRows& rows, RungCounts& counts) {
+    const std::size_t count = pair_count(a.rings, b.rings);
     std::vector<Vec2> points;
     points.reserve(contact_set ? 2 * count : 0);
-    FirstContactSolver solver(largest_ring(a), largest_ring(b));
+    Solver solver(largest_ring(a.rings), largest_ring(b.rings));
     rows.point_offsets[0] = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        const FirstContact contact =
-            solver.solve({a[item(a.size(), i)], va[item(velocity_a.shape(0), i)]},
-                         {b[item(b.size(), i)], vb[item(velocity_b.shape(0), i)]}, t_max, contact_set);
+        const FirstContact contact = solver.solve(a[i], b[i], t_max, contact_set);
         rows.status[i] = static_cast<std::uint8_t>(contact.status);
         rows.time[i] = contact.time;
         rows.time_lower[i] = contact.time_lower;
@@ -91,8 +116,25 @@ std::vector<Vec2> first_contacts(const Rings& a, const Rings& b, const Rows2& ve
         rows.normal[i] = contact.normal;
         points.insert(points.end(), contact.points.begin(), contact.points.end());
         rows.point_offsets[i + 1] = static_cast<std::int64_t>(points.size());
+        rows.certain[i] = contact.certain;
+        ++counts[static_cast<std::size_t>(contact.rung) - 1];
     }
     return points;
+}
+
+/// Points as an array that keeps their vector alive: copying many into fresh memory costs as much as finding
+/// some.
+nb::object rows_of(std::vector<Vec2> points) {
+    if (points.empty()) {
+        return empty<double>({0, 2}).array;
+    }
+    auto kept = std::make_unique<std::vector<Vec2>>(std::move(points));
+    const std::size_t count = kept->size();
+    double* const data = &kept->front().x;
+    const nb::capsule owner(kept.get(),
+                            [](void* vector) noexcept { delete static_cast<std::vector<Vec2>*>(vector); });
+    [[maybe_unused]] const auto* const owned = kept.release();
+    return nb::cast(nb::ndarray<nb::numpy, double, nb::shape<-1, 2>, nb::c_contig>(data, {count, 2}, owner));
 }
 
 struct DistanceRows {
@@ -103,12 +145,16 @@ struct DistanceRows {
     Vec2* point_b;
     Vec2* normal;
     std::uint8_t* status;
+    bool* meet;
+    bool* certain;
 };
 
-void distances(const Rings& a, const Rings& b, bool penetration, const DistanceRows& rows) {
+template <class Solver>
+void distances(const Rings& a, const Rings& b, bool penetration, const DistanceRows& rows,
+               RungCounts& counts) {
     constexpr std::uint8_t kOk = 0;
-    const std::size_t count = a.size() == 1 ? b.size() : a.size();
-    PolygonDistanceSolver solver(largest_ring(a), largest_ring(b));
+    const std::size_t count = pair_count(a, b);
+    Solver solver(largest_ring(a), largest_ring(b));
     for (std::size_t i = 0; i < count; ++i) {
         const PolygonDistance found = solver.solve(a[item(a.size(), i)], b[item(b.size(), i)], penetration);
         rows.distance[i] = found.distance;
@@ -118,7 +164,22 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
         rows.point_b[i] = found.point_b;
         rows.normal[i] = found.normal;
         rows.status[i] = kOk;
+        rows.meet[i] = found.meet;
+        rows.certain[i] = found.certain;
+        ++counts[static_cast<std::size_t>(found.rung)];
     }
+}
+
+/// Calls `work` with the solver of a tier.
+template <class Bound, class Float64, class Exact, class Work>
+auto at_tier(std::string_view accuracy, const Work& work) {
+    if (accuracy == "bound") {
+        return work(std::type_identity<Bound>{});
+    }
+    if (accuracy == "exact") {
+        return work(std::type_identity<Exact>{});
+    }
+    return work(std::type_identity<Float64>{});
 }
 
 struct BatchReport {
@@ -156,10 +217,10 @@ void define_polygons(nb::module_& m) {
         "first_contact_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
            const Offsets& offsets_b, const Rows2& velocity_a, const Rows2& velocity_b, double t_max,
-           bool contact_set) {
-            const Rings a(vertices_a, offsets_a);
-            const Rings b(vertices_b, offsets_b);
-            const std::size_t count = a.size() == 1 ? b.size() : a.size();
+           bool contact_set, const char* accuracy) {
+            const MovingRings a(vertices_a, offsets_a, velocity_a);
+            const MovingRings b(vertices_b, offsets_b, velocity_b);
+            const std::size_t count = pair_count(a.rings, b.rings);
             const auto status = empty<std::uint8_t>({count});
             const auto time = empty<double>({count});
             const auto time_lower = empty<double>({count});
@@ -167,32 +228,35 @@ void define_polygons(nb::module_& m) {
             const auto last_time = empty<double>({count});
             const auto normal = empty<double>({count, 2});
             const auto point_offsets = empty<std::int64_t>({count + 1});
+            const auto certain = empty<bool>({count});
+            const ContactRows rows{status.data,        time.data,      time_lower.data,
+                                   time_upper.data,    last_time.data, reinterpret_cast<Vec2*>(normal.data),
+                                   point_offsets.data, certain.data};
+            RungCounts counts{};
             std::vector<Vec2> found;
             {
                 const nb::gil_scoped_release unlocked;
-                found =
-                    first_contacts(a, b, velocity_a, velocity_b, t_max, contact_set,
-                                   {status.data, time.data, time_lower.data, time_upper.data, last_time.data,
-                                    reinterpret_cast<Vec2*>(normal.data), point_offsets.data});
-            }
-            const auto points = empty<double>({found.size(), 2});
-            if (!found.empty()) {
-                std::memcpy(points.data, found.data(), found.size() * sizeof(Vec2));
+                found = at_tier<BoundFirstContactSolver, FirstContactSolver, ExactFirstContactSolver>(
+                    accuracy, [&]<class S>(S /*tier*/) {
+                        return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
+                    });
             }
             return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
-                                  last_time.array, normal.array, points.array, point_offsets.array);
+                                  last_time.array, normal.array, rows_of(std::move(found)),
+                                  point_offsets.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
         nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(),
         nb::arg("velocity_a").noconvert(), nb::arg("velocity_b").noconvert(), nb::arg("t_max"),
-        nb::arg("contact_set"));
+        nb::arg("contact_set"), nb::arg("accuracy") = "float64");
     m.def(
         "distance_polygons",
         [](const Rows2& vertices_a, const Offsets& offsets_a, const Rows2& vertices_b,
-           const Offsets& offsets_b, bool penetration) {
+           const Offsets& offsets_b, bool penetration, const char* accuracy) {
             const Rings a(vertices_a, offsets_a);
             const Rings b(vertices_b, offsets_b);
-            const std::size_t count = a.size() == 1 ? b.size() : a.size();
+            const std::size_t count = pair_count(a, b);
             const auto distance = empty<double>({count});
             const auto lower = empty<double>({count});
             const auto upper = empty<double>({count});
@@ -200,18 +264,32 @@ void define_polygons(nb::module_& m) {
             const auto point_b = empty<double>({count, 2});
             const auto normal = empty<double>({count, 2});
             const auto status = empty<std::uint8_t>({count});
+            const auto meet = empty<bool>({count});
+            const auto certain = empty<bool>({count});
+            const DistanceRows rows{distance.data,
+                                    lower.data,
+                                    upper.data,
+                                    reinterpret_cast<Vec2*>(point_a.data),
+                                    reinterpret_cast<Vec2*>(point_b.data),
+                                    reinterpret_cast<Vec2*>(normal.data),
+                                    status.data,
+                                    meet.data,
+                                    certain.data};
+            RungCounts counts{};
             {
                 const nb::gil_scoped_release unlocked;
-                distances(a, b, penetration,
-                          {distance.data, lower.data, upper.data, reinterpret_cast<Vec2*>(point_a.data),
-                           reinterpret_cast<Vec2*>(point_b.data), reinterpret_cast<Vec2*>(normal.data),
-                           status.data});
+                at_tier<BoundPolygonDistanceSolver, PolygonDistanceSolver, ExactPolygonDistanceSolver>(
+                    accuracy, [&]<class S>(S /*tier*/) {
+                        distances<typename S::type>(a, b, penetration, rows, counts);
+                    });
             }
             return nb::make_tuple(distance.array, lower.array, upper.array, point_a.array, point_b.array,
-                                  normal.array, status.array);
+                                  normal.array, status.array, meet.array, certain.array,
+                                  nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
         },
         nb::arg("vertices_a").noconvert(), nb::arg("offsets_a").noconvert(),
-        nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(), nb::arg("penetration"));
+        nb::arg("vertices_b").noconvert(), nb::arg("offsets_b").noconvert(), nb::arg("penetration"),
+        nb::arg("accuracy") = "float64");
 }
 
 }  // namespace geomsrv::bind

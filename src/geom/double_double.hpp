@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include "geom/vec.hpp"
 
@@ -73,6 +74,21 @@ constexpr DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
     const double q3 = rest.hi / b.hi;
     return quick_two_sum(q1, q2) + DoubleDouble{q3, 0.0};
 }
+
+/// Relative error of `quotient`: Joldes, Muller, Popescu 2017, algorithm DWDivDW2, has 15; one for the bound.
+inline constexpr double kQuotientError = 16.0 * 0x1p-106;
+
+/// a / b in two divisions; infinite or NaN as in double.
+inline DoubleDouble quotient(DoubleDouble a, DoubleDouble b) {
+    const double first = a.hi / b.hi;
+    if (!(std::fabs(first) < std::numeric_limits<double>::infinity())) {
+        return {first, 0.0};
+    }
+    const DoubleDouble product = two_product(first, b.hi);
+    const double rest = ((a.hi - product.hi) - product.lo) + (a.lo - first * b.lo);
+    return quick_two_sum(first, rest / b.hi);
+}
+
 inline DoubleDouble sqrt(DoubleDouble a) {
     if (!(a.hi > 0.0)) {
         return {};

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <type_traits>
 
 #include "geom/double_double.hpp"
 #include "geom/exact_number.hpp"
 #include "geom/rounding.hpp"
+#include "geom/rung.hpp"
 
 namespace geomsrv {
 
@@ -27,10 +29,17 @@ struct Enclosed {
 // Rounding of the error bounds themselves: fewer than 16 roundings each, all of positive numbers.
 inline constexpr double kBoundRounding = 1.0 + 16 * kUnitRoundoff;
 
-// Parts of a product that leave the normal range lose at most a few 2^-1074 each.  The last bit of a product
-// of doubles is 2^-105 of it, so larger ones lose nothing.
+// Parts of a product that leave the normal range lose at most a few 2^-1074 each.  Above the second constant
+// none does: the lowest bit of a product of doubles is 2^-106 of it.
 inline constexpr double kEnclosedUnderflow = 0x1p-1060;
-inline constexpr double kSurelyNormal = 0x1p-900;
+inline constexpr double kNoUnderflow = 0x1p-960;
+
+/// Known to be zero.
+inline bool is_zero(const Enclosed& x) { return x.value.hi == 0.0 && x.error == 0.0; }
+
+// The same with room to spare, for products of more than two.
+inline constexpr double kWholeProduct = 0x1p-900;
+inline constexpr double kSurelyNormal = kWholeProduct;
 
 inline Enclosed operator-(const Enclosed& a) { return {-a.value, a.error}; }
 inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
@@ -38,6 +47,12 @@ inline Enclosed operator+(const Enclosed& a, const Enclosed& b) {
     // Two doubles whose sum is found without rest: nothing is rounded.
     if (a.value.lo == 0.0 && b.value.lo == 0.0) {
         return {sum, (a.error + b.error) * kBoundRounding};
+    }
+    if (is_zero(a)) {
+        return b;
+    }
+    if (is_zero(b)) {
+        return a;
     }
     const double larger = std::max(std::fabs(a.value.hi), std::fabs(b.value.hi));
     return {sum, ((a.error + b.error) + kWideRoundoff * larger) * kBoundRounding};
@@ -47,13 +62,13 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
     const DoubleDouble product = a.value * b.value;
     const double size_a = std::fabs(a.value.hi);
     const double size_b = std::fabs(b.value.hi);
+    // Of two doubles the product is found without rest, unless it is so small that parts of it underflow.
     const bool exact = a.value.lo == 0.0 && b.value.lo == 0.0;
     const double rounding = exact ? 0.0 : kWideRoundoff * std::fabs(product.hi);
-    const bool zero = (size_a == 0.0 && a.error == 0.0) || (size_b == 0.0 && b.error == 0.0);
-    const bool kept = std::fabs(product.hi) > kSurelyNormal && a.error == 0.0 && b.error == 0.0;
+    const bool whole = is_zero(a) || is_zero(b) || (exact && std::fabs(product.hi) > kNoUnderflow);
     return {product,
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
-                (zero || kept ? 0.0 : kEnclosedUnderflow)};
+                (whole ? 0.0 : kEnclosedUnderflow)};
 }
 
 /// The product of two doubles, in the arithmetic named.
@@ -83,7 +98,7 @@ inline int sign_of(const Enclosed& x) {
     if (size > x.error * kBoundRounding && size < std::numeric_limits<double>::infinity()) {
         return x.value.hi > 0.0 ? 1 : -1;
     }
-    return size == 0.0 && x.error == 0.0 ? 0 : kUncertain;
+    return is_zero(x) ? 0 : kUncertain;
 }
 inline int sign_of(const Exact& x) { return x.sign(); }
 

@@ -1,17 +1,20 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-// Four doubles at a time, so that one kernel written for a number also serves as vector code.
+// Four doubles or eight floats at a time, so that one kernel written for a number also serves as vector code.
 #pragma once
 
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <type_traits>
+#include <utility>
 
 // One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the
 // processor has it.  Both give the same bits, because contraction is off and a fused multiply-add is only
-// where std::fma says so.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+// where std::fma says so.  GEOMSRV_ONE_PATH compiles it once, for the target, which is how tests compare the two.
+#if !defined(GEOMSRV_ONE_PATH) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
 #else
 #define GEOMSRV_WIDE_CLONES
@@ -22,67 +25,117 @@
 
 namespace geomsrv {
 
-/// Four doubles; operations are lane by lane and compile to whatever vectors the target has.
-struct Lanes {
-    static constexpr int kCount = 4;
-    using Vector = double __attribute__((vector_size(kCount * sizeof(double))));
-    Vector v;
-
-    /// As stored: a double's alignment is enough.
-    using Stored __attribute__((vector_size(kCount * sizeof(double)), aligned(alignof(double)), may_alias)) =
-        double;
-
-    Lanes() = default;
-    // Written out: GCC moves the members of a defaulted copy through general registers.
-    GEOMSRV_INLINE Lanes(const Lanes& other) : v(other.v) {}
-    GEOMSRV_INLINE Lanes& operator=(const Lanes& other) {
-        v = other.v;
-        return *this;
-    }
-    ~Lanes() = default;
-    GEOMSRV_INLINE Lanes(double x) : v{x, x, x, x} {}  // NOLINT: numbers are lanes
-    GEOMSRV_INLINE explicit Lanes(const Vector& x) : v(x) {}
-    GEOMSRV_INLINE static Lanes load(const double* from) {
-        return Lanes(Vector(*reinterpret_cast<const Stored*>(from)));
-    }
-    GEOMSRV_INLINE double operator[](int i) const { return v[i]; }
-    GEOMSRV_INLINE void store(double* to) const { *reinterpret_cast<Stored*>(to) = v; }
-};
-
 /// Outcome of a comparison in each lane: all bits set or none.
-struct LaneMask {
-    using Vector = std::int64_t __attribute__((vector_size(Lanes::kCount * sizeof(std::int64_t))));
+template <class Whole, int Count>
+struct MaskOf {
+    using Vector [[gnu::vector_size(Count * sizeof(Whole))]] = Whole;
     Vector v;
-    LaneMask() = default;
-    GEOMSRV_INLINE LaneMask(const LaneMask& other) : v(other.v) {}
-    GEOMSRV_INLINE LaneMask& operator=(const LaneMask& other) {
+    MaskOf() = default;
+    // Written out: GCC moves the members of a defaulted copy through general registers.
+    GEOMSRV_INLINE MaskOf(const MaskOf& other) : v(other.v) {}
+    GEOMSRV_INLINE MaskOf& operator=(const MaskOf& other) {
         v = other.v;
         return *this;
     }
-    ~LaneMask() = default;
-    GEOMSRV_INLINE explicit LaneMask(const Vector& x) : v(x) {}
+    ~MaskOf() = default;
+    GEOMSRV_INLINE explicit MaskOf(const Vector& x) : v(x) {}
+
+    GEOMSRV_INLINE friend MaskOf operator&(const MaskOf& a, const MaskOf& b) { return MaskOf(a.v & b.v); }
+    GEOMSRV_INLINE friend MaskOf operator|(const MaskOf& a, const MaskOf& b) { return MaskOf(a.v | b.v); }
+    GEOMSRV_INLINE friend MaskOf operator~(const MaskOf& a) { return MaskOf(~a.v); }
+    GEOMSRV_INLINE friend bool all(const MaskOf& a) {
+        const auto w = reinterpret_cast<Words>(a.v);
+        if constexpr (kWide) {
+            return ((w[0] & w[1]) & (w[2] & w[3])) == -1;
+        } else {
+            return (w[0] & w[1]) == -1;
+        }
+    }
+    GEOMSRV_INLINE friend bool any(const MaskOf& a) {
+        const auto w = reinterpret_cast<Words>(a.v);
+        if constexpr (kWide) {
+            return ((w[0] | w[1]) | (w[2] | w[3])) != 0;
+        } else {
+            return (w[0] | w[1]) != 0;
+        }
+    }
+
+private:
+    // Lanes have one outcome each, so words of any size tell the same.
+    static constexpr bool kWide = Count * sizeof(Whole) == 32;
+    using FourWords [[gnu::vector_size(32)]] = std::int64_t;
+    using TwoWords [[gnu::vector_size(16)]] = std::int64_t;
+    using Words = std::conditional_t<kWide, FourWords, TwoWords>;
 };
 
-GEOMSRV_INLINE Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
-GEOMSRV_INLINE Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
-GEOMSRV_INLINE Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
-GEOMSRV_INLINE Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
-GEOMSRV_INLINE Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
-GEOMSRV_INLINE LaneMask operator<(const Lanes& a, const Lanes& b) { return LaneMask(a.v < b.v); }
-GEOMSRV_INLINE LaneMask operator<=(const Lanes& a, const Lanes& b) { return LaneMask(a.v <= b.v); }
-GEOMSRV_INLINE LaneMask operator&(const LaneMask& a, const LaneMask& b) { return LaneMask(a.v & b.v); }
-GEOMSRV_INLINE LaneMask operator~(const LaneMask& a) { return LaneMask(~a.v); }
-GEOMSRV_INLINE LaneMask operator|(const LaneMask& a, const LaneMask& b) { return LaneMask(a.v | b.v); }
-GEOMSRV_INLINE bool all(const LaneMask& a) { return ((a.v[0] & a.v[1]) & (a.v[2] & a.v[3])) != 0; }
-GEOMSRV_INLINE bool any(const LaneMask& a) { return ((a.v[0] | a.v[1]) | (a.v[2] | a.v[3])) != 0; }
+/// Numbers side by side; operations are lane by lane and compile to whatever vectors the target has.
+template <class Number, int Count>
+struct LanesOf {
+    static constexpr int kCount = Count;
+    using Real = Number;
+    using Mask = MaskOf<std::conditional_t<sizeof(Number) == 8, std::int64_t, std::int32_t>, Count>;
+    using Vector [[gnu::vector_size(Count * sizeof(Number))]] = Number;
+    Vector v;
+
+    /// As stored: a number's alignment is enough.
+    using Stored [[gnu::vector_size(Count * sizeof(Number)), gnu::aligned(alignof(Number)), gnu::may_alias]] =
+        Number;
+
+    LanesOf() = default;
+    GEOMSRV_INLINE LanesOf(const LanesOf& other) : v(other.v) {}
+    GEOMSRV_INLINE LanesOf& operator=(const LanesOf& other) {
+        v = other.v;
+        return *this;
+    }
+    ~LanesOf() = default;
+    GEOMSRV_INLINE LanesOf(Number x) : v(Vector{} + x) {}  // NOLINT: numbers are lanes
+    GEOMSRV_INLINE explicit LanesOf(const Vector& x) : v(x) {}
+    GEOMSRV_INLINE static LanesOf load(const Number* from) {
+        return LanesOf(Vector(*reinterpret_cast<const Stored*>(from)));
+    }
+    GEOMSRV_INLINE Number operator[](int i) const { return v[i]; }
+    GEOMSRV_INLINE void store(Number* to) const { *reinterpret_cast<Stored*>(to) = v; }
+
+    GEOMSRV_INLINE friend LanesOf operator-(const LanesOf& a) { return LanesOf(-a.v); }
+    GEOMSRV_INLINE friend LanesOf operator+(const LanesOf& a, const LanesOf& b) { return LanesOf(a.v + b.v); }
+    GEOMSRV_INLINE friend LanesOf operator-(const LanesOf& a, const LanesOf& b) { return LanesOf(a.v - b.v); }
+    GEOMSRV_INLINE friend LanesOf operator*(const LanesOf& a, const LanesOf& b) { return LanesOf(a.v * b.v); }
+    GEOMSRV_INLINE friend LanesOf operator/(const LanesOf& a, const LanesOf& b) { return LanesOf(a.v / b.v); }
+    GEOMSRV_INLINE friend Mask operator<(const LanesOf& a, const LanesOf& b) { return Mask(a.v < b.v); }
+    GEOMSRV_INLINE friend Mask operator<=(const LanesOf& a, const LanesOf& b) { return Mask(a.v <= b.v); }
+    GEOMSRV_INLINE friend LanesOf select(const Mask& condition, const LanesOf& a, const LanesOf& b) {
+        return LanesOf(condition.v ? a.v : b.v);
+    }
+    GEOMSRV_INLINE friend LanesOf magnitude(const LanesOf& a) {
+        return a.each([](Number x) __attribute__((always_inline)) { return std::fabs(x); });
+    }
+    GEOMSRV_INLINE friend LanesOf square_root(const LanesOf& a) {
+        return a.each([](Number x) __attribute__((always_inline)) { return std::sqrt(x); });
+    }
+    GEOMSRV_INLINE friend LanesOf fused_multiply_add(const LanesOf& a, const LanesOf& b, const LanesOf& c) {
+        return [&]<std::size_t... Lane>(std::index_sequence<Lane...>) __attribute__((always_inline)) {
+            return LanesOf(Vector{std::fma(a.v[Lane], b.v[Lane], c.v[Lane])...});
+        }(std::make_index_sequence<Count>{});
+    }
+
+private:
+    template <class Step>
+    GEOMSRV_INLINE LanesOf each(Step step) const {
+        return [&]<std::size_t... Lane>(std::index_sequence<Lane...>) __attribute__((always_inline)) {
+            return LanesOf(Vector{step(v[Lane])...});
+        }(std::make_index_sequence<Count>{});
+    }
+};
+
+using Lanes = LanesOf<double, 4>;
+using LaneMask = Lanes::Mask;
+/// As wide, of single precision.
+using FloatLanes = LanesOf<float, 8>;
 
 /// condition ? a : b, for a number and lane by lane.
 template <class Real>
 GEOMSRV_INLINE Real select(bool condition, Real a, Real b) {
     return condition ? a : b;
-}
-GEOMSRV_INLINE Lanes select(const LaneMask& condition, const Lanes& a, const Lanes& b) {
-    return Lanes(condition.v ? a.v : b.v);
 }
 
 template <class Real>
@@ -92,6 +145,32 @@ GEOMSRV_INLINE Real lesser(const Real& a, const Real& b) {
 template <class Real>
 GEOMSRV_INLINE Real greater(const Real& a, const Real& b) {
     return select(b < a, a, b);
+}
+
+GEOMSRV_INLINE void store(const LaneMask& mask, std::int64_t* to) {
+    Lanes((Lanes::Vector)mask.v).store(reinterpret_cast<double*>(to));
+}
+GEOMSRV_INLINE LaneMask load_mask(const std::int64_t* from) {
+    return LaneMask((LaneMask::Vector)Lanes::load(reinterpret_cast<const double*>(from)).v);
+}
+
+/// x where the condition holds, else 0.
+GEOMSRV_INLINE Lanes kept(const LaneMask& condition, const Lanes& x) {
+    return Lanes((Lanes::Vector)(condition.v & (LaneMask::Vector)x.v));
+}
+/// x with its sign changed where s is negative.
+GEOMSRV_INLINE Lanes with_sign_of(const Lanes& s, const Lanes& x) {
+    constexpr std::int64_t kSign = std::numeric_limits<std::int64_t>::min();
+    return Lanes((Lanes::Vector)(((LaneMask::Vector)s.v & kSign) ^ (LaneMask::Vector)x.v));
+}
+/// The greatest power of two that is not above x, for normal x > 0.
+GEOMSRV_INLINE Lanes power_of_two_in(const Lanes& x) {
+    constexpr std::int64_t kExponent = 0x7ff0000000000000;
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v & kExponent));
+}
+/// The `steps`-th next double, for normal x > 0.
+GEOMSRV_INLINE Lanes neighbour(const Lanes& x, const LaneMask::Vector& steps) {
+    return Lanes((Lanes::Vector)((LaneMask::Vector)x.v + steps));
 }
 
 GEOMSRV_INLINE double least(const Lanes& a) { return lesser(lesser(a[0], a[1]), lesser(a[2], a[3])); }
@@ -107,25 +186,25 @@ GEOMSRV_INLINE void store_bytes(const Lanes& x, std::uint8_t* to) {
     std::memcpy(to, &packed, sizeof packed);
 }
 
+GEOMSRV_INLINE void store_bytes(const FloatLanes& x, std::uint8_t* to) {
+    for (int i = 0; i < FloatLanes::kCount; ++i) to[i] = static_cast<std::uint8_t>(x[i]);
+}
+
+/// Rounded to single precision.
+GEOMSRV_INLINE FloatLanes joined(const Lanes& low, const Lanes& high) {
+    return FloatLanes(__builtin_convertvector(__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7),
+                                              FloatLanes::Vector));
+}
+
 GEOMSRV_INLINE double magnitude(double x) { return std::fabs(x); }
 GEOMSRV_INLINE long double magnitude(long double x) { return std::fabs(x); }
-GEOMSRV_INLINE Lanes magnitude(const Lanes& x) {
-    return Lanes(Lanes::Vector{std::fabs(x[0]), std::fabs(x[1]), std::fabs(x[2]), std::fabs(x[3])});
-}
 
 template <class Real>
 GEOMSRV_INLINE Real fused_multiply_add(Real a, Real b, Real c) {
     return std::fma(a, b, c);
 }
-GEOMSRV_INLINE Lanes fused_multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) {
-    return Lanes(Lanes::Vector{std::fma(a[0], b[0], c[0]), std::fma(a[1], b[1], c[1]),
-                               std::fma(a[2], b[2], c[2]), std::fma(a[3], b[3], c[3])});
-}
 
 GEOMSRV_INLINE double square_root(double x) { return std::sqrt(x); }
 GEOMSRV_INLINE long double square_root(long double x) { return std::sqrt(x); }
-GEOMSRV_INLINE Lanes square_root(const Lanes& x) {
-    return Lanes(Lanes::Vector{std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])});
-}
 
 }  // namespace geomsrv

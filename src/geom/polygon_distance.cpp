@@ -154,6 +154,10 @@ Vec2 on_edge(Vec2 start, Vec2 end, double t) {
     return start + t * way;
 }
 
+// Error of a place along an edge, in units of its length: dot products that are right to twice the precision
+// are rounded once each, their quotient once more; the fourth covers the bound.
+constexpr double kPlaceError = 4.0 * kUnitRoundoff;
+
 /// Points of both polygons over each other on an axis: `own` on the axis' edge, `opposite` on the lowest
 /// vertex or edge of the other polygon; of two parallel edges the middle of their common part.
 struct Facing {
@@ -174,7 +178,21 @@ Facing facing_points(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
     const auto place = [&](std::size_t j) {
         return enclosed_dot(edge, pair.difference(q.ring[j], start)).value.hi / squared_length;
     };
-    const double at = place(vertex);
+    const auto is_beside = [](double at) { return at < -kPlaceError || at > 1.0 + kPlaceError; };
+    // The other polygon runs against this edge.
+    const auto towards = [&](std::size_t j, double at) { return at > 1.0 ? q.next(j) : q.previous(j); };
+    double at = place(vertex);
+    // The axis of the distance or depth has a vertex beside its edge only where others are as low, exactly or
+    // but for a tilt below all digits of the gap: the last one that is beside it ends an edge over its end.
+    for (std::size_t steps = 0; is_beside(at) && steps < q.edges; ++steps) {
+        const std::size_t next = towards(vertex, at);
+        const double to = place(next);
+        if (at > 1.0 ? !(to > 1.0 && to < at) : !(to < 0.0 && to > at)) {
+            break;
+        }
+        vertex = next;
+        at = to;
+    }
     for (const std::size_t neighbour : {q.next(vertex), q.previous(vertex)}) {
         if (neighbour == vertex || sign_of_cross(start, end, q.ring[vertex], q.ring[neighbour]) != 0) {
             continue;
@@ -185,7 +203,14 @@ Facing facing_points(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
         return {on_edge(start, end, std::clamp(middle, 0.0, 1.0)),
                 on_edge(q.ring[vertex], q.ring[neighbour], std::clamp((middle - at) / (to - at), 0.0, 1.0))};
     }
-    return {on_edge(start, end, std::clamp(at, 0.0, 1.0)), q.ring[vertex]};
+    const double nearest = std::clamp(at, 0.0, 1.0);
+    const Vec2 own = on_edge(start, end, nearest);
+    const std::size_t next = towards(vertex, at);
+    if (is_beside(at) && next != vertex) {
+        const double way = (nearest - at) / (place(next) - at);
+        return {own, on_edge(q.ring[vertex], q.ring[next], std::clamp(way, 0.0, 1.0))};
+    }
+    return {own, q.ring[vertex]};
 }
 
 /// Writes points and normal of an axis along which the polygons face each other.
@@ -244,8 +269,14 @@ PolygonDistance nearest_points(const PolygonPair& pair, double widest) {
         result.lower = std::max(result.lower, found.lower);
     }
     result.lower = std::min(result.lower, result.distance);
-    const ExactVec2 way = pair.difference(points.opposite, points.own);
-    return with_points(result, best.axis, points, {way.x.hi, way.y.hi});
+    const Vec2 given_way = points.opposite - points.own;
+    const bool finite = std::isfinite(given_way.x) && std::isfinite(given_way.y);
+    if (best.length.hi == 0.0) {
+        // The square of a distance so far below the size of the pair underflows.
+        result.distance = std::hypot(given_way.x, given_way.y);
+        result.upper = std::max(result.upper, next_up(result.distance));
+    }
+    return with_points(result, best.axis, points, finite ? given_way : pair.way(points.own, points.opposite));
 }
 
 enum class Relation { apart, touching, overlapping };
@@ -327,6 +358,7 @@ PolygonDistance PolygonDistanceSolver::solve(Ring a, Ring b, bool penetration) {
     }
     if (decision.relation == Relation::overlapping) {
         PolygonDistance result = deepest_points(pair_, widest.lower);
+        result.meet = true;
         if (penetration) {
             return result;
         }
@@ -339,10 +371,12 @@ PolygonDistance PolygonDistanceSolver::solve(Ring a, Ring b, bool penetration) {
                 result.point_a = result.point_a + share * corner;
             }
         }
-        return {0.0, 0.0, 0.0, result.point_a, result.point_a, result.normal};
+        return {0.0, 0.0, 0.0, result.point_a, result.point_a, result.normal, true};
     }
     const AxisOf axis = decision.touching_axis;
-    return with_points({}, axis, facing_points(pair_, axis, pair_.lowest(axis)),
+    PolygonDistance result;
+    result.meet = true;
+    return with_points(result, axis, facing_points(pair_, axis, pair_.lowest(axis)),
                        pair_.side(axis.side).axis(axis.index));
 }
 

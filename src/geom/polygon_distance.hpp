@@ -5,6 +5,7 @@
 
 #include <cstddef>
 
+#include "geom/enclosed.hpp"
 #include "geom/polygon.hpp"
 #include "geom/polygon_overlap.hpp"
 #include "geom/polygon_pair.hpp"
@@ -19,6 +20,9 @@ struct PolygonDistance {
     Vec2 point_a;  ///< nearest point of a; its deepest point in b; or, depth not asked for, a common point
     Vec2 point_b;  ///< likewise of b; point_b = point_a + distance * normal up to rounding
     Vec2 normal;   ///< unit, from a to b: moving b by depth * normal parts them
+    bool meet = false;         ///< whether they have a common point
+    bool certain = true;       ///< ... as is proven for the given numbers
+    Rung rung = Rung::filter;  ///< what it took
 };
 
 /// Holds scratch memory for polygons of at most so many vertices, so that a query allocates nothing.

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "geom/enclosed.hpp"
 #include "geom/polygon.hpp"
 #include "geom/polygon_overlap.hpp"
 #include "geom/polygon_pair.hpp"
@@ -31,6 +32,8 @@ struct FirstContact {
     double last_time;              ///< [s], at most t_max; infinite if they never part
     Vec2 normal;                   ///< unit, from a to b, at `time`; NaN if overlapping
     std::span<const Vec2> points;  ///< contact set at `time`, world frame; valid until the next call
+    bool certain = false;          ///< the status is proven for the given numbers
+    Rung rung = Rung::filter;      ///< what it took
 };
 
 /// Ring and constant velocity [m/s] in the world frame.

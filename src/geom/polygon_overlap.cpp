@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geom/lanes.hpp"
+
 namespace geomsrv {
 
 namespace {
+
+constexpr std::size_t kLanes = Lanes::kCount;
 
 /// Where an edge of one polygon crosses an edge line of the other, to about the last place: both are needed
 /// in double-double, because the ends of the edges may be far from the crossing.
@@ -17,32 +21,89 @@ Vec2 crossing(const PolygonPair& pair, int side, std::size_t vertex, AxisOf axis
     const Vec2 to = p.ring[p.next(vertex)];
     const Vec2 base = pair.side(axis.side).ring[pair.side(axis.side).base(axis.index)];
     const ExactVec2 normal = pair.exact_axis(axis);
-    const DoubleDouble t = enclosed_dot(normal, pair.difference(base, from)).value /
-                           enclosed_dot(normal, pair.difference(to, from)).value;
-    const auto at = [&t](double start, double end) {
-        const DoubleDouble way = two_sum(end, -start);
-        // A difference beyond the largest double: the crossing lies between the ends all the same.
-        if (!std::isfinite(way.hi)) {
-            return (1.0 - t.hi) * start + t.hi * end;
-        }
-        return (DoubleDouble{start, 0.0} + t * way).hi;
-    };
-    return {at(from.x, to.x), at(from.y, to.y)};
+    const ExactVec2 way = pair.difference(to, from);
+    const DoubleDouble t =
+        quotient(enclosed_dot(normal, pair.difference(base, from)).value, enclosed_dot(normal, way).value);
+    // An edge that is level up to rounding may cross the line beyond its ends.
+    return t.hi >= 1.0 ? to : t.hi <= 0.0 ? from : pair.moved(from, t * way.x, t * way.y);
 }
 
-/// Height of v over the line through p and q, or its distance from p if they are closer than `tolerance`.
-double height(Vec2 p, Vec2 q, Vec2 v, double tolerance) {
-    const Vec2 base = q - p;
-    const double length = std::hypot(base.x, base.y);
-    if (!(length > tolerance)) {
-        return std::hypot(v.x - p.x, v.y - p.y);
+/// Whether v is within `tolerance` of the line through p and q, or of p if they are closer than that.
+bool is_level(Vec2 p_to_q, Vec2 p_to_v, double tolerance) {
+    const double squared_length = dot(p_to_q, p_to_q);
+    const double square = tolerance * tolerance;
+    if (!(squared_length > square)) {
+        return dot(p_to_v, p_to_v) <= square;
     }
-    return std::fabs(cross((1.0 / length) * base, v - p));
+    const double area = cross(p_to_q, p_to_v);
+    return area * area <= square * squared_length;
 }
 
 /// Vertices that are nearer to each other than this, scaled, are one: both may be off by as much as an axis.
 double merging_distance(const PolygonPair& pair, Slack slack) {
     return 2.0 * (pair.gap_error() + std::min(2.0 * slack.noise, slack.limit));
+}
+
+/// Leaves for every axis of q the own support in work[0], and in work[1] how far beyond it still counts as
+/// inside.
+GEOMSRV_WIDE_CLONES void leave_levels(const PolygonPair& pair, const PairedPolygon& q, Slack slack) {
+    for (std::size_t k = 0; k < q.axes; k += kLanes) {
+        const Lanes dx = Lanes::load(q.dx + k);
+        const Lanes dy = Lanes::load(q.dy + k);
+        const Lanes size = magnitude(dx) + magnitude(dy);
+        const Lanes noise = lesser<Lanes>(slack.noise * (size + Lanes(pair.reach())), slack.limit * size);
+        (dx * Lanes::load(q.x + k) + dy * Lanes::load(q.y + k)).store(q.work[0] + k);
+        (pair.gap_error() * size + Lanes(kPairUnderflow) + noise).store(q.work[1] + k);
+    }
+}
+
+/// Leaves in work[0] and work[1] of p, for every edge, from where to where it is inside of q, 0 to 1; to -1
+/// if all of it is beyond some axis.
+///
+/// Four edges at a time: they need no outcome of one another.
+GEOMSRV_WIDE_CLONES void clip_edges(const PairedPolygon& p, const PairedPolygon& q) {
+    const std::size_t n = p.ring.size();
+    const Lanes none = 0.0;
+    const Lanes whole = 1.0;
+    const double* const own = q.work[0];
+    const double* const level = q.work[1];
+    for (std::size_t i = 0; i < n; i += kLanes) {
+        const Lanes x = Lanes::load(p.x + i);
+        const Lanes y = Lanes::load(p.y + i);
+        const auto next_of = [&](const double* at) {
+            const auto next = [&](std::size_t j) { return at[i + j + 1 < n ? i + j + 1 : 0]; };
+            return Lanes(Lanes::Vector{next(0), next(1), next(2), next(3)});
+        };
+        const Lanes next_x = next_of(p.x);
+        const Lanes next_y = next_of(p.y);
+        Lanes enter = none;
+        Lanes leave = whole;
+        for (std::size_t k = 0; k < q.axes; ++k) {
+            const Lanes from = Lanes(q.dx[k]) * x + Lanes(q.dy[k]) * y - Lanes(own[k]);
+            const Lanes to = Lanes(q.dx[k]) * next_x + Lanes(q.dy[k]) * next_y - Lanes(own[k]);
+            const LaneMask starts_beyond = Lanes(level[k]) < from;
+            const LaneMask ends_beyond = Lanes(level[k]) < to;
+            const Lanes time = from / (from - to);
+            enter = greater(enter, select(starts_beyond & ~ends_beyond, time, none));
+            leave = lesser(leave, select(ends_beyond, select(starts_beyond, Lanes(-1.0), time), whole));
+        }
+        enter.store(p.work[0] + i);
+        leave.store(p.work[1] + i);
+    }
+}
+
+/// The axis at which an edge enters or leaves at a time that `clip_edges` has found.
+std::size_t crossed_axis(const PairedPolygon& q, Vec2 start, Vec2 end, double time, bool entering) {
+    for (std::size_t k = 0; k < q.axes; ++k) {
+        const double from = dot(q.axis(k), start) - q.work[0][k];
+        const double to = dot(q.axis(k), end) - q.work[0][k];
+        const double outer = entering ? from : to;
+        const double inner = entering ? to : from;
+        if (outer > q.work[1][k] && !(inner > q.work[1][k]) && from / (from - to) == time) {
+            return k;
+        }
+    }
+    return 0;
 }
 
 }  // namespace
@@ -54,35 +115,23 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
     if (q.axes == 0) {
         return;
     }
+    leave_levels(pair, q, slack);
+    clip_edges(p, q);
     // A segment is one edge, not two; a point an edge of no length.
     const std::size_t edges = std::max<std::size_t>(p.edges == 2 ? 1 : p.edges, 1);
     for (std::size_t i = 0; i < edges; ++i) {
         const std::size_t end = p.next(i);
-        double enter = 0.0;
-        double leave = 1.0;
-        std::size_t enter_axis = 0;
-        std::size_t leave_axis = 0;
-        for (std::size_t k = 0; k < q.axes && leave >= 0.0; ++k) {
-            const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
-            const double level = pair.gap_error() * size + kPairUnderflow +
-                                 std::min(slack.noise * (size + pair.reach()), slack.limit * size);
-            const double from = dot(q.axis(k), p.local(i)) - q.own(k);
-            const double to = dot(q.axis(k), p.local(end)) - q.own(k);
-            if (from > level && to > level) {
-                leave = -1.0;
-            } else if (from > level && from / (from - to) > enter) {
-                enter = from / (from - to);
-                enter_axis = k;
-            } else if (to > level && from / (from - to) < leave) {
-                leave = from / (from - to);
-                leave_axis = k;
-            }
-        }
+        const double enter = p.work[0][i];
+        const double leave = p.work[1][i];
+        const auto crossing_at = [&](double time, bool entering) {
+            return crossing(pair, side, i,
+                            {1 - side, crossed_axis(q, p.local(i), p.local(end), time, entering)});
+        };
         if (enter > leave) {
             // Across a sliver, rounding may exchange the two crossings.
             const double length = std::hypot(p.x[end] - p.x[i], p.y[end] - p.y[i]);
             if (leave >= 0.0 && enter <= 1.0 && (enter - leave) * length <= merging_distance(pair, slack)) {
-                found_.push_back(crossing(pair, side, i, {1 - side, enter_axis}));
+                found_.push_back(crossing_at(enter, true));
             }
             continue;
         }
@@ -91,10 +140,10 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             found_.push_back(p.ring[i]);
         }
         if (enter > 0.0) {
-            found_.push_back(crossing(pair, side, i, {1 - side, enter_axis}));
+            found_.push_back(crossing_at(enter, true));
         }
         if (leave < 1.0) {
-            found_.push_back(crossing(pair, side, i, {1 - side, leave_axis}));
+            found_.push_back(crossing_at(leave, false));
         }
         if (leave == 1.0 && p.edges == 2) {
             found_.push_back(p.ring[end]);
@@ -114,14 +163,15 @@ std::span<const Vec2> PolygonOverlap::of(const PolygonPair& pair, Slack slack) {
 
     // Where the polygons share a line, or cross in a vertex, rounding leaves vertices that are not there in
     // truth.
-    const double tolerance = std::scalbn(merging_distance(pair, slack), -pair.scale_exponent());
+    const double tolerance = merging_distance(pair, slack);
     merged_.assign(hull.begin(), hull.end());
     for (std::size_t i = 0; merged_.size() > 1 && i < merged_.size();) {
         const std::size_t n = merged_.size();
-        const Vec2 before = merged_[(i + n - 1) % n];
-        const Vec2 behind = merged_[(i + 1) % n];
-        const bool repeated = std::hypot(merged_[i].x - before.x, merged_[i].y - before.y) <= tolerance;
-        if (repeated || (n > 2 && height(before, behind, merged_[i], tolerance) <= tolerance)) {
+        const Vec2 before = merged_[(i > 0 ? i : n) - 1];
+        const Vec2 way = pair.way(before, merged_[i]);
+        const bool repeated = dot(way, way) <= tolerance * tolerance;
+        if (repeated ||
+            (n > 2 && is_level(pair.way(before, merged_[i + 1 < n ? i + 1 : 0]), way, tolerance))) {
             merged_.erase(merged_.begin() + static_cast<std::ptrdiff_t>(i));
         } else {
             ++i;

@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "geom/double_double.hpp"
+#include "geom/enclosed.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/polygon.hpp"
 #include "geom/vec.hpp"
@@ -36,8 +37,9 @@ namespace geomsrv {
 
 /// Error of a gap, relative to |D|_1 times the reach of the pair, in units of kUnitRoundoff: edge, local
 /// coordinate, product and sum make 4 for each of the two projections, their difference 2 (it is at most 2
-/// |D|_1 reach); the rest covers second-order terms and the rounding of the bound.
-inline constexpr double kGapError = 12.0;
+/// |D|_1 reach), adding the bound to it 2 more; the rest covers second-order terms and the rounding of the
+/// bound.
+inline constexpr double kGapError = 14.0;
 
 /// Added for large polygons, whose supports are found by walking: an edge whose height is misjudged because
 /// it is within 5 units of level is worth 5 |D|_1 of its length, and all edges together are at most 8 reaches
@@ -83,12 +85,6 @@ struct ExactVec2 {
     DoubleDouble x, y;
 };
 
-/// A number and how far the exact one may be from it.
-struct Enclosed {
-    DoubleDouble value;
-    double error = 0.0;
-};
-
 /// Error of a dot product of exact vectors relative to the sum over its terms, in units of 2^-106: 7 for a
 /// product (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic building blocks of
 /// double-word arithmetic", 2017), 3 for a sum that takes no care of cancellation; the rest covers the bound.
@@ -109,6 +105,12 @@ struct Chain {
     std::size_t last = 0;
 };
 
+/// A vertex, and the one beside it that is exactly as low; itself if there is none.
+struct Level {
+    std::size_t vertex = 0;
+    std::size_t neighbour = 0;
+};
+
 /// An axis of one of the two polygons.
 struct AxisOf {
     int side = 0;  ///< 0: of a, 1: of b
@@ -122,9 +124,13 @@ struct Slack {
     double limit = 0.0;
 };
 
-/// Unit vector, whatever the length of v; v is not zero.
+/// Unit vector, whatever the length of v; zero for zero, which an edge may be that is far smaller than the
+/// pair.
 inline Vec2 unit(Vec2 v) {
     const double largest = std::max(std::fabs(v.x), std::fabs(v.y));
+    if (largest == 0.0) {
+        return {};
+    }
     const Vec2 reduced{v.x / largest, v.y / largest};
     return (1.0 / norm(reduced)) * reduced;
 }
@@ -155,10 +161,23 @@ public:
     [[nodiscard]] double gap_error() const { return gap_error_; }
 
     /// The exact difference of two given points, times the scale.
-    [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const;
+    [[nodiscard]] ExactVec2 difference(Vec2 to, Vec2 from) const {
+        const auto apart = [this](double end, double start) -> DoubleDouble {
+            const DoubleDouble way = two_sum(before_ * end, -(before_ * start));
+            return {scale_ * way.hi, scale_ * way.lo};
+        };
+        return {apart(to.x, from.x), apart(to.y, from.y)};
+    }
+    /// The same, rounded, from one point to the other.
+    [[nodiscard]] Vec2 way(Vec2 from, Vec2 to) const {
+        return {scale_ * (before_ * to.x - before_ * from.x), scale_ * (before_ * to.y - before_ * from.y)};
+    }
+    /// A given point moved by a scaled vector, rounded once; only an end beyond the doubles is infinite.
+    [[nodiscard]] Vec2 moved(Vec2 from, DoubleDouble x, DoubleDouble y) const;
 
     /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
-    [[nodiscard]] std::size_t lowest(AxisOf axis) const;
+    [[nodiscard]] Level lowest_level(AxisOf axis) const;
+    [[nodiscard]] std::size_t lowest(AxisOf axis) const { return lowest_level(axis).vertex; }
     /// All that are as low as that one, up to rounding and `slack`.  Heights are summed over edges, which are
     /// relatively exact, so that nearly parallel edges of polygons far apart are told from parallel ones.
     [[nodiscard]] Chain lowest(AxisOf axis, std::size_t vertex, Slack slack) const;
@@ -170,7 +189,14 @@ public:
     [[nodiscard]] AxisOf widest_gap() const;
 
     /// The axis itself: exact for edges, and for tips by definition.
-    [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const;
+    [[nodiscard]] ExactVec2 exact_axis(AxisOf axis) const {
+        const PairedPolygon& p = side(axis.side);
+        if (axis.index >= p.edges) {
+            return {{p.dx[axis.index], 0.0}, {p.dy[axis.index], 0.0}};
+        }
+        const ExactVec2 edge = difference(p.ring[p.next(axis.index)], p.ring[axis.index]);
+        return {edge.y, -edge.x};
+    }
     /// Gap along an axis to twice the precision, and its exact sign; `vertex` is the `lowest`.
     [[nodiscard]] Enclosed enclosed_gap(AxisOf axis, const ExactVec2& direction, std::size_t vertex) const;
     [[nodiscard]] int sign_of_gap(AxisOf axis, std::size_t vertex) const;

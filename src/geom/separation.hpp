@@ -16,6 +16,7 @@
 #include <limits>
 
 #include "geom/core.hpp"
+#include "geom/rung.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -44,14 +45,6 @@ struct Wanted {
     bool penetration = false;  ///< how deep overlapping bodies are, not only that they meet
     Tier tier = Tier::float64;
     bool simplex = false;  ///< the proof of the answer, even where another one is cheaper
-};
-
-/// How high up the ladder of arithmetics the answer had to climb.
-enum class Rung : std::uint8_t {
-    bound,   ///< bounding volumes only
-    filter,  ///< one precision, with an error bound
-    wide,    ///< double-double with error bounds
-    exact,
 };
 
 /// Faces whose points the nearest points are combined from: point_a = sum of weight[i] * vertex a[i].
