@@ -10,6 +10,7 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
+#include <typeinfo>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -320,13 +321,22 @@ private:
     }
 
     static Rows rows_of(const nb::tuple& arrays) {
-        if (arrays.size() == 2) {
-            return HullRows{as<Rows3>(arrays[0]), as<Offsets>(arrays[1])};
+        try {
+            switch (arrays.size()) {
+                case 1:
+                    return OneFrustum(as<Input<double, nb::shape<18>>>(arrays[0]));
+                case 2:
+                    return HullRows{as<Rows3>(arrays[0]), as<Offsets>(arrays[1])};
+                case 3:
+                    return BoxRows{as<Rows3>(arrays[0]), as<Matrices3>(arrays[1]), as<Rows3>(arrays[2])};
+                default:
+                    break;
+            }
+        } catch (const std::bad_cast&) {
+            // Said below, with the rest.
         }
-        if (arrays.size() == 1) {
-            return OneFrustum(as<Input<double, nb::shape<18>>>(arrays[0]));
-        }
-        return BoxRows{as<Rows3>(arrays[0]), as<Matrices3>(arrays[1]), as<Rows3>(arrays[2])};
+        throw nb::type_error("distance: a side must be (center, axes, half_extents), (vertices, offsets) or "
+                             "(packed frustum,)");
     }
 
     Rows rows_;
