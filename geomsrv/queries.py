@@ -52,7 +52,7 @@ CULL_COUNTS = {
 # What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SOLID_TIERS = ("float64", "exact")
+SOLID_TIERS = ("bound", "float64", "exact")
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
