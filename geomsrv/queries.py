@@ -52,7 +52,7 @@ CULL_COUNTS = {
 # What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SOLID_TIERS = ("float64", "exact")
+SOLID_TIERS = ("bound", "float64", "exact")
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -450,8 +450,7 @@ def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:
         return batch.center, batch.axes, batch.half_extents
     if isinstance(batch, Polytopes):
         return batch.vertices, batch.offsets
-    corners, error = batch.corners(batch.origin), batch.corner_error(batch.origin)
-    return batch.packed(), corners, np.array([error])
+    return (batch.packed(),)
 
 
 def _length(side: Batch) -> int:

@@ -553,7 +553,10 @@ QUERIES: dict[str, Callable[..., Any]] = {
 }
 
 
-TIERS_ANSWERED = {"cull": ("bound", "float32", "exact")}  #: besides float64
+TIERS_ANSWERED = {
+    name: ("bound", "float32", "exact")
+    for name in ("cull", "first_contact", "distance", "distance.batches", "intersects")
+}  #: besides float64
 
 
 @pytest.mark.parametrize("query", QUERIES)

@@ -35,8 +35,8 @@ public:
         const bool zonotopes =
             a_.exact.kind == ExactBody::Kind::zonotope && b_.exact.kind == ExactBody::Kind::zonotope;
         if (zonotopes && !want_.simplex && !surely_apart(found)) {
-            const ExactGap gap = largest_facet_gap(a_, b_, in_range_);
-            if (gap.found && gap.gap.upper <= 0.0) {
+            const ExactGap gap = largest_facet_gap(a_, b_, in_range_, want_.penetration);
+            if (gap.found && gap.meet) {
                 return deep(gap.gap, gap.normal, found.witness, gap.rung);
             }
         }
@@ -64,7 +64,7 @@ private:
             return deep({}, nan_vector(), simplex, rung);
         }
         if (a_.exact.kind == ExactBody::Kind::zonotope && b_.exact.kind == ExactBody::Kind::zonotope) {
-            const ExactGap gap = largest_facet_gap(a_, b_, in_range_);
+            const ExactGap gap = largest_facet_gap(a_, b_, in_range_, true);
             if (gap.found) {
                 return deep(gap.gap, gap.normal, simplex, std::max(rung, gap.rung));
             }

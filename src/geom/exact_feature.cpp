@@ -24,7 +24,11 @@ bool rounded(const VectorOf<Enclosed>& v, Vec3& out) {
     return std::max({v.x.error, v.y.error, v.z.error}) <= kNextToNothing * size;
 }
 
-/// Whether doubles prove that the foot lies within; sets its weights.
+// Weights may move the foot by this much of the size of the feature, in terms of the bound above, which is
+// some ten times what happens: more comes from slivers only, and they get weights from double-double.
+constexpr double kFootDoubt = 128 * kUnitRoundoff;
+
+/// Whether doubles prove that the foot lies within, and are good enough for its weights, which are set then.
 bool surely_holds_foot(const FeatureOf<Enclosed>& here, double* weight) {
     Vec3 w;
     Vec3 e;
@@ -43,7 +47,8 @@ bool surely_holds_foot(const FeatureOf<Enclosed>& here, double* weight) {
         const double first = divisor - second;
         weight[0] = first / divisor;
         weight[1] = second / divisor;
-        return std::min(first, second) > kFootError * norm(e) * (norm(e) + norm(w));
+        const double length = std::sqrt(divisor);
+        return std::min(first, second) > kFootError * length * (length + norm(w));
     }
     if (!rounded(here.f, f) || !rounded(here.along, n)) {
         return false;
@@ -56,7 +61,10 @@ bool surely_holds_foot(const FeatureOf<Enclosed>& here, double* weight) {
     weight[1] = second / divisor;
     weight[2] = third / divisor;
     const double length = std::sqrt(divisor);
-    return std::min({first, second, third}) > kFootError * length * (length + norm(w) * (norm(e) + norm(f)));
+    const double edges = norm(e) + norm(f);
+    const double size = norm(w) + edges;
+    const double doubt = kFootError * length * (length + norm(w) * edges);
+    return std::min({first, second, third}) > doubt && doubt * edges <= kFootDoubt * divisor * size;
 }
 
 }  // namespace
