@@ -251,6 +251,13 @@ def test_broken_record_is_refused(change) -> None:
         verify_record(record)
 
 
+def test_touching_is_meeting() -> None:
+    record = distance_record({"kind": "sphere", "radius": 5.0}, {"kind": "hull", "vertices": [[3.0, 4.0, 0.0]]})
+    assert record["claim"]["meets"] and proves(record)
+    record["claim"]["meets"] = False
+    assert not proves(record)
+
+
 @pytest.mark.parametrize("scene", ["cull", "first contact"])
 def test_radius_is_for_distances_only(scene, rng) -> None:
     record = SCENES[scene](rng)
