@@ -335,8 +335,9 @@ private:
         } catch (const std::bad_cast&) {
             // Said below, with the rest.
         }
-        throw nb::type_error("distance: a side must be (center, axes, half_extents), (vertices, offsets) or "
-                             "(packed frustum,)");
+        throw nb::type_error(
+            "distance: a side must be (center, axes, half_extents), (vertices, offsets) or "
+            "(packed frustum,)");
     }
 
     Rows rows_;

@@ -276,8 +276,7 @@ RoundedCorners rounded_corners(const Frustum& f, bool from_apex) {
         const DoubleDouble left{scale * ((i & 1) != 0 ? f.l1 : f.l0), 0.0};
         const DoubleDouble up{scale * ((i & 2) != 0 ? f.u1 : f.u0), 0.0};
         const DoubleDouble near{scale * f.near, 0.0};
-        WideVec3 ray =
-            left * widen(f.axes.row[0]) + up * widen(f.axes.row[1]) + near * widen(f.axes.row[2]);
+        WideVec3 ray = left * widen(f.axes.row[0]) + up * widen(f.axes.row[1]) + near * widen(f.axes.row[2]);
         const int exponent = (i & 4) != 0 ? up_far - up_near : 0;
         if ((i & 4) != 0) {
             ray = ratio * ray;
