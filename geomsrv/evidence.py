@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import combinations, product
-from typing import Any, NamedTuple
+from itertools import combinations
+from typing import Any
 
 from geomsrv.verify import (
     Pair,
     Vector,
-    axis_of,
+    clips_of,
     dot,
     in_units,
     nearest,
@@ -46,56 +46,54 @@ def evidence_of_distance(a: Record, b: Record, start: Pairs, normal: list[float]
 
 def evidence_of_contact(a: Record, b: Record, status: str, t_max: float) -> Record:
     """Of when polygons first touch, or that they never do."""
-    if status == "OVERLAPPING":
-        return {}
     pair = Pair(a, b)
     speed = relative_velocity(a, b, pair.unit)
-    evidence: Record = {}
-    for axes in (_edges(pair), _every_axis(pair)):
-        clips = [_clip(pair, speed, axis) for axis in axes]
-        if status == "NEVER":
-            found = [clip for clip in clips if clip.gap > 0 and (clip.time is None or clip.time > t_max)]
-        elif status == "TOUCHING":
-            found = [clip for clip in clips if clip.gap == 0]
-        else:  # they are apart until the last gap has closed
-            closing = [clip for clip in clips if clip.time]
-            found = [max(closing, key=lambda clip: clip.time or 0)] if closing else []
-        if found:
-            evidence["axis"], _, time = found[0]
-            if status == "NEVER":
-                return evidence
-            moved = pair.moved(speed, time or Fraction(0))
-            evidence["simplex"] = _simplex(moved.a, moved.b, [])
-            if not any(nearest(moved.differences(evidence["simplex"]))[0]):
-                return evidence
-    return evidence
+    if status == "OVERLAPPING":
+        return {"around": _around(pair)}
+    latest, named = Fraction(0), Record()
+    for ways in (_edges(pair), _chords(pair)):
+        for way in ways:
+            clips = clips_of(pair, speed, way)
+            if status == "NEVER" and any(gap > 0 and (time is None or time > t_max) for gap, time in clips):
+                return way
+            time = max((time for _, time in clips if time is not None), default=latest)
+            if time > latest if status == "WILL_TOUCH" else any(gap == 0 for gap, _ in clips):
+                latest, named = time, way
+        moved = pair.moved(speed, latest if status == "WILL_TOUCH" else Fraction(0))
+        simplex = _simplex(moved.a, moved.b, [])
+        if not any(nearest(moved.differences(simplex))[0]):
+            break
+    return named | {"simplex": simplex}
 
 
-class _Clip(NamedTuple):
-    axis: list[int]
-    gap: int
-    time: Fraction | None  #: when the gap has closed; None if it does not, or there is none
+def _edges(pair: Pair) -> Iterator[Record]:
+    """No facet, then those of both rings; of points, a point."""
+    yield {}
+    yield from ({"facet": [[i, 0], [(i + 1) % len(pair.a), 0]]} for i in range(len(pair.a)))
+    yield from ({"facet": [[0, j], [0, (j + 1) % len(pair.b)]]} for j in range(len(pair.b)))
 
 
-def _clip(pair: Pair, speed: Vector, axis: list[int]) -> _Clip:
-    n = axis_of(pair, speed, axis)
-    gap, closing = pair.gap(n) if any(n) else -1, -dot(n, speed)
-    closes = gap > 0 and closing > 0
-    return _Clip(axis, gap, Fraction(gap * pair.unit, closing * pair.scale) if closes else None)
+def _chords(pair: Pair) -> Iterator[Record]:
+    """Between any two vertices: rings may be dented by rounding, and then an edge of the hull is none of the ring."""
+    yield from ({"facet": [[i, 0], [k, 0]]} for i, k in combinations(range(len(pair.a)), 2))
+    yield from ({"facet": [[0, j], [0, k]]} for j, k in combinations(range(len(pair.b)), 2))
 
 
-def _edges(pair: Pair) -> Iterator[list[int]]:
-    """Axes that are enough for rings that are exactly convex, in motion and not both of them points."""
-    for side, points in enumerate((pair.a, pair.b)):
-        yield from ([side, i, (i + 1) % len(points), 0] for i in range(len(points)))
-    yield from ([side, 0, 0, 0] for side in (2, 3))
-
-
-def _every_axis(pair: Pair) -> Iterator[list[int]]:
-    for side, points in enumerate((pair.a, pair.b)):
-        yield from ([side, i, j, 0] for i, j in combinations(range(len(points)), 2))
-    yield from ([4, i, 0, k] for i, k in product(range(len(pair.a)), range(len(pair.b))))
-    yield [5, 0, 0, 0]
+def _around(pair: Pair) -> Pairs:
+    """Differences around the origin, each the one that lies farthest to the left as seen from the one before."""
+    pairs: Pairs = []
+    n, turned = [1, 0], [0, 0]
+    while len(pairs) <= len(pair.a) + len(pair.b):  # so many edges has b - a
+        i = min(range(len(pair.a)), key=lambda k: dot(n, pair.a[k]))
+        j = max(range(len(pair.b)), key=lambda k: dot(n, pair.b[k]))
+        x, y = sum_of(pair.b[j], -1, pair.a[i])
+        n = [-y, x]
+        pairs.append([i, j])
+        if len(pairs) == 1:
+            turned = n
+        elif dot(turned, [x, y]) < 0:  # the first one is to the left of this one
+            break
+    return pairs
 
 
 def _simplex(a: Sequence[Vector], b: Sequence[Vector], start: Pairs) -> Pairs:

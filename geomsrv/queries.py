@@ -51,8 +51,8 @@ CULL_COUNTS = {
 }
 # What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
-CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SOLID_TIERS = ("float64", "exact")
+CLIMB = {"bound": RUNGS[:1], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
+SOLID_TIERS = ("bound", "float64", "exact")
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -64,14 +64,17 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     boxes : Boxes
         n oriented boxes, world frame.
     accuracy : str
-        Tier; see the numerics page.
+        Tier: "bound" looks at the sphere around a box only, and answers INTERSECTS where that is not outside or inside;
+        "float32" and "float64" look at planes and axes, and say where rounding leaves a doubt; "exact" leaves none.
     certificates : bool
         Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
 
     Returns
     -------
     Cull
-        ``state`` and ``certain``, (n,) each.  Both bodies are closed: touching is INTERSECTS.
+        ``state`` and ``certain``, (n,) each.  Both bodies are closed: touching is INTERSECTS.  ``cost.counts``: boxes
+        decided by "bound" (spheres and planes), by "filter" (all axes), in "wide" arithmetic (double-double), in
+        "exact" arithmetic; and left "uncertain".
 
     Raises
     ------
@@ -204,7 +207,10 @@ def first_contact(
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
-        Tier; see the numerics page.
+        Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
+        rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
+        circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
+        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -245,7 +251,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, tuple(CLIMB) if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -423,7 +429,7 @@ def _polygon_distance(
     a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
 ) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
-    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
+    tier = _validate.accuracy(accuracy, tuple(CLIMB))
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(
@@ -452,8 +458,7 @@ def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:
         return batch.center, batch.axes, batch.half_extents
     if isinstance(batch, Polytopes):
         return batch.vertices, batch.offsets
-    corners, error = batch.corners(batch.origin), batch.corner_error(batch.origin)
-    return batch.packed(), corners, np.array([error])
+    return (batch.packed(),)
 
 
 def _length(side: Batch) -> int:

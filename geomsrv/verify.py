@@ -54,7 +54,7 @@ def verify_lines(lines: Iterable[str]) -> Iterator[tuple[int, bool, str]]:
         try:
             record = json.loads(line)
             verify_record(record)
-        except ValueError as fault:
+        except (ValueError, RecursionError) as fault:
             yield number, True, str(fault)
         else:
             yield number, bool(record["claim"]), ""
@@ -66,10 +66,11 @@ def verify_record(record: Fields) -> None:
     try:
         check, a, b = checks[record["query"]], record["a"], record["b"]
         if record["claim"]:
+            _require(check is _distance or not ("radius" in a or "radius" in b), "no radius is expected here")
             check(Pair(a, b), a, b, record["claim"], record["evidence"])
     except CertificateError:
         raise
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as fault:
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as fault:
         raise CertificateError(f"not a well-formed record: {type(fault).__name__}: {fault}") from fault
 
 
@@ -109,7 +110,7 @@ def sum_of(a: Vector, factor: int, b: Vector) -> list[int]:
     return [x + factor * y for x, y in zip(a, b, strict=True)]
 
 
-def cross(a: Vector, b: Vector) -> list[int]:
+def _cross(a: Vector, b: Vector) -> list[int]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
@@ -160,11 +161,10 @@ class Pair:
         lowest = min(dot(along, v) for v in self.b)
         return lowest - max(dot(along, v) for v in self.a)
 
-    def differences(self, simplex: Sequence[Sequence[int]]) -> list[list[int]]:
+    def differences(self, pairs: Sequence[Sequence[int]]) -> list[list[int]]:
         """Vertices of b minus vertices of a, of the listed pairs."""
-        inside = all(0 <= i < len(self.a) and 0 <= j < len(self.b) for i, j in simplex)
-        _require(inside and 1 <= len(simplex) <= 4, "simplex: no such vertices")
-        return [sum_of(self.b[j], -1, self.a[i]) for i, j in simplex]
+        _require(all(0 <= i < len(self.a) and 0 <= j < len(self.b) for i, j in pairs), "evidence: no such vertices")
+        return [sum_of(self.b[j], -1, self.a[i]) for i, j in pairs]
 
     def moved(self, speed: Vector, time: Fraction) -> Pair:
         """The bodies at that time, on a scale of their own; `speed` is that of b as seen from a, times the unit."""
@@ -184,6 +184,7 @@ def _determinant(m: Sequence[Vector]) -> int:
 
 def nearest(points: Sequence[Vector]) -> tuple[list[int], int, Sequence[int]]:
     """The point v of a simplex nearest to the origin: whole * v, whole > 0, and which corners v is a mixture of."""
+    _require(1 <= len(points) <= 4, "simplex: not one to four pairs")
     found: list[tuple[list[int], int, Sequence[int]]] = []
     for size in range(len(points), 0, -1):
         for chosen in combinations(range(len(points)), size):
@@ -204,12 +205,12 @@ def nearest(points: Sequence[Vector]) -> tuple[list[int], int, Sequence[int]]:
 
 def normals_to(corners: Sequence[Vector]) -> list[list[int]]:
     """Both directions across a facet; of corners that span less, some of those across them."""
-    plane = len(corners[0]) == 2
-    arms = [sum_of(p, -1, corners[0]) for p in corners[1:]]
-    if len(arms) < len(corners[0]) - 1 or not any(arms[0] if plane else cross(*arms)):
-        arms += [[int(i == k) for i in range(len(corners[0]))] for k in range(len(corners[0]))]
-    found = [across((0, 0), p) for p in arms] if plane else [cross(p, q) for p, q in combinations(arms, 2)]
-    return [[sign * x for x in n] for n in found for sign in (1, -1) if any(n)]
+    size = len(corners[0])
+    arms = [sum_of(p, -1, corners[0]) for p in corners[1:size]]
+    if len(arms) < size - 1 or not any(arms[0] if size == 2 else _cross(*arms)):
+        arms += [[int(i == k) for i in range(size)] for k in range(size)]
+    normals = [[y, -x] for x, y in arms] if size == 2 else [_cross(p, q) for p, q in combinations(arms, 2)]
+    return [[sign * x for x in n] for n in normals for sign in (1, -1) if any(n)]
 
 
 # ------------------------------------------------------------------------------------------------------- claims
@@ -255,7 +256,7 @@ _FACES = [[i for i in range(8) if i >> bit & 1 == side] for bit, side in _SIDES]
 def _face(corners: Sequence[Vector], plane: int) -> tuple[list[int], int]:
     """The half space n . x <= d that a face of a frustum bounds: n and d."""
     p, q, r = (corners[i] for i in _FACES[plane][:3])
-    n = cross(sum_of(q, -1, p), sum_of(r, -1, p))
+    n = _cross(sum_of(q, -1, p), sum_of(r, -1, p))
     heights = [dot(n, sum_of(v, -1, p)) for i, v in enumerate(corners) if i not in _FACES[plane]]
     _require(min(heights) > 0 or max(heights) < 0, "a is not a frustum")
     outward = [-x for x in n] if heights[0] > 0 else n
@@ -269,43 +270,26 @@ def _cull(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fields) -> 
     _require(0 <= corner < 8 and 0 <= plane < 6, "beyond: no such corner or plane")
     v = nearest(pair.differences(evidence["simplex"]))[0] if "simplex" in evidence else None
 
-    def within(point: Vector, times: int = 1) -> bool:
-        return all(dot(n, point) <= times * d for n, d in (_face(pair.a, k) for k in range(6)))
+    def within(*points: Vector, times: int = 1) -> bool:
+        faces = [_face(pair.a, k) for k in range(6)]
+        return all(dot(n, point) <= times * d for n, d in faces for point in points)
 
-    def beyond(points: Iterable[Vector]) -> bool:
+    def beyond(*points: Vector) -> bool:
         n, d = _face(pair.a, plane)
         return all(dot(n, point) > d for point in points)
 
     if state == "INSIDE":
-        _require(all(map(within, pair.b)), "INSIDE: a corner is beyond a plane")
+        _require(within(*pair.b), "INSIDE: a corner is beyond a plane")
     elif state == "OUTSIDE":
-        _require(pair.gap(v) > 0 if v else beyond(pair.b), "OUTSIDE: not apart along the direction")
+        _require(pair.gap(v) > 0 if v else beyond(*pair.b), "OUTSIDE: not apart along the direction")
     else:
-        _require(state == "INTERSECTS" and beyond([pair.b[corner]]), f"{state}: the corner is not beyond the plane")
+        _require(state == "INTERSECTS" and beyond(pair.b[corner]), f"{state}: the corner is not beyond the plane")
         if v is None:  # a corner of the box, or without one its centre
             inside = evidence["inside"]
-            common = within(pair.b[inside[0]]) if inside else within(sum_of(pair.b[0], 1, pair.b[7]), 2)
+            common = within(pair.b[inside[0]]) if inside else within(sum_of(pair.b[0], 1, pair.b[7]), times=2)
         else:
             common = not any(v)
         _require(common, "INTERSECTS: no common point")
-
-
-def across(p: Vector, q: Vector) -> list[int]:
-    """The vector from p to q in the plane, turned clockwise: out of a counter-clockwise ring."""
-    return [q[1] - p[1], p[0] - q[0]]
-
-
-def _normals(points: Iterable[Vector]) -> list[list[int]]:
-    """Outward normals of a hull in the plane (Andrew's monotone chain); both of a segment, none of a point."""
-    ordered, ring = sorted(set(map(tuple, points))), []
-    for half in (ordered, ordered[::-1]):
-        chain: list[Vector] = []
-        for p in half:
-            while len(chain) > 1 and dot(across(chain[-2], chain[-1]), sum_of(p, -1, chain[-2])) >= 0:
-                chain.pop()
-            chain.append(p)
-        ring += chain[:-1]
-    return [across(p, q) for p, q in zip(ring, ring[1:] + ring[:1], strict=True)]
 
 
 def relative_velocity(a: Fields, b: Fields, unit: int) -> list[int]:
@@ -313,47 +297,41 @@ def relative_velocity(a: Fields, b: Fields, unit: int) -> list[int]:
     return sum_of(in_units(b["velocity"], unit), -1, in_units(a["velocity"], unit))
 
 
-def axis_of(pair: Pair, speed: Vector, axis: Sequence[int]) -> list[int]:
-    """The direction, of either sign, that the evidence names by side, i, j, k; turned to where there is more room."""
-    side, i, j, k = axis
-    if side in (0, 1):  # across the edge from vertex i to j of a, of b
-        points = (pair.a, pair.b)[side]
-        _require(0 <= min(i, j) <= max(i, j) < len(points), "axis: no such edge")
-        n = across(points[i], points[j])
-    elif side in (2, 3):  # across the relative velocity, along it
-        n = across((0, 0), speed) if side == 2 else list(speed)
-    elif side == 4:  # from vertex i of a to vertex k of b
-        (n,) = pair.differences([(i, k)])
-    else:  # along x
-        _require(side == 5, "axis: no such side")
-        n = [1, 0]
-    return max(n, [-x for x in n], key=pair.gap)
+def clips_of(pair: Pair, speed: Vector, evidence: Fields) -> list[tuple[int, Fraction | None]]:
+    """Gaps along, across the velocity and across the facet, each with the time when it has closed; None if it stays."""
+    along = [n for m in (speed, [speed[1], -speed[0]]) for n in (m, [-x for x in m]) if any(n)]
+    if "facet" in evidence:
+        along += normals_to(pair.differences(evidence["facet"]))
+    clips: list[tuple[int, Fraction | None]] = []
+    for n in along:
+        gap, closing = pair.gap(n), -dot(n, speed)
+        time = Fraction(gap * pair.unit, closing * pair.scale) if closing > 0 else None
+        clips.append((gap, time if gap > 0 else Fraction(0)))
+    return clips
 
 
 def _first_contact(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fields) -> None:
     """Polygons that move at constant velocity: NEVER, WILL_TOUCH at time, TOUCHING or OVERLAPPING at 0."""
-    status = claim["status"]
+    status, t_max, time = claim["status"], _float(claim["t_max"]), Fraction(0)
     speed = relative_velocity(a, b, pair.unit)
-    time, t_max = Fraction(0), _float(claim["t_max"])
     _require(len(speed) == 2 == len(pair.a[0]) and t_max >= 0.0, "not polygons, or t_max < 0")
-    if status == "OVERLAPPING":
-        normals = _normals(pair.a) + _normals(pair.b)
-        overlap = all(pair.gap(n) < 0 and pair.gap([-x for x in n]) < 0 for n in normals)
-        _require(bool(normals) and overlap, "OVERLAPPING: the depth is 0")
+    if status == "OVERLAPPING":  # each difference lies less than half a turn further round the origin
+        around = pair.differences(evidence["around"])
+        turns = [p[0] * q[1] - p[1] * q[0] for p, q in zip(around, around[1:] + around[:1], strict=True)]
+        _require(bool(turns) and min(turns) > 0, "OVERLAPPING: the origin is not within the differences")
     else:
-        n = axis_of(pair, speed, evidence["axis"])
-        _require(any(n), "axis: no direction")
-        gap, closing = pair.gap(n), -dot(n, speed)
-        if gap > 0 and closing > 0:  # apart along n before this time
-            time = Fraction(gap * pair.unit, closing * pair.scale)
+        clips = clips_of(pair, speed, evidence)
         if status == "NEVER":
-            _require(gap > 0 and (closing <= 0 or time > t_max), "NEVER: not apart along the axis until t_max")
+            apart = any(gap > 0 and (closed is None or closed > t_max) for gap, closed in clips)
+            _require(apart, "NEVER: not apart until t_max")
             return
-        if status == "WILL_TOUCH":
-            _require(0 < time <= t_max, "WILL_TOUCH: no contact along the axis within t_max")
+        if status == "WILL_TOUCH":  # apart until the last gap has closed
+            time = max((closed for _, closed in clips if closed), default=time)
+            _require(0 < time <= t_max, "WILL_TOUCH: not apart at first, or longer than t_max")
         else:
-            _require(status == "TOUCHING" and gap == 0, f"{status}: the room along the axis is not 0")
-        differences = pair.moved(speed, time).differences(evidence["simplex"])
-        _require(not any(nearest(differences)[0]), f"{status}: no common point at that time")
+            touching = status == "TOUCHING" and any(gap == 0 for gap, _ in clips)
+            _require(touching, f"{status}: the depth is not 0")
+        simplex = pair.moved(speed, time).differences(evidence["simplex"])
+        _require(not any(nearest(simplex)[0]), f"{status}: no common point at that time")
     lower, value, upper = (_float(claim[name]) for name in ("time_lower", "time", "time_upper"))
     _require(lower <= value <= upper and lower <= time <= upper, "the time is not in [time_lower, time_upper]")

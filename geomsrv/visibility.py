@@ -75,7 +75,7 @@ def _by_box(world: World, rows: IntArray, frustum: Frustum) -> tuple[ByteArray, 
     margin = np.where(exact | np.isinf(scale), 0.0, AABB_ROUNDING * scale) + world.uncertainty[rows]
     center = position + np.einsum("nij,nj->ni", turn, table.center[shape])
     axes = np.ascontiguousarray(np.swapaxes(turn, 1, 2))
-    state, certain, *_ = _core.cull(frustum.packed(), center, axes, half + margin[:, None])
+    state, certain, *_ = _core.cull(frustum.packed(), center, axes, half + margin[:, None], "float64", False)
     return state, certain
 
 

@@ -72,18 +72,28 @@ def gap(n: Vector, a: list[Vector], b: list[Vector]) -> Any:
     return min(dot(n, q) for q in b) - max(dot(n, p) for p in a)
 
 
-def axes_of(a: list[Vector], b: list[Vector], speed: Vector) -> Iterator[tuple[list[int], Vector]]:
-    """All directions that evidence can name."""
-    for side, points in enumerate((a, b)):
-        for i, j in product(range(len(points)), repeat=2):
-            x, y = sub(points[j], points[i])
-            yield [side, i, j, 0], (y, -x)
+def facets_of(a: list[Vector], b: list[Vector]) -> Iterator[list[list[int]]]:
+    """Every two vertices of one body, with one of the other, as evidence names directions; first of all, none."""
+    yield []
+    yield from ([[i, 0], [k, 0]] for i, k in product(range(len(a)), repeat=2))
+    yield from ([[0, j], [0, k]] for j, k in product(range(len(b)), repeat=2))
+
+
+def directions_of(facet: list[list[int]], a: list[Vector], b: list[Vector], speed: Vector) -> list[Vector]:
+    """What a facet stands for: directions across it or, if it is a point, along the axes; and always the velocity's."""
     x, y = speed
-    yield from (([2, 0, sign < 0, 0], scale(sign, (y, -x))) for sign in (1, -1))
-    yield from (([3, 0, sign < 0, 0], scale(sign, (x, y))) for sign in (1, -1))
-    for i, k in product(range(len(a)), range(len(b))):
-        yield [4, i, 0, k], sub(b[k], a[i])
-        yield [4, i, 0, k], sub(a[i], b[k])
+    found = [(x, y), (y, -x)]
+    if facet:
+        (i, j), (k, m) = facet
+        x, y = sub(sub(b[m], a[k]), sub(b[j], a[i]))
+        found += [(y, -x)] if x or y else [(1, 0), (0, 1)]
+    return [scale(sign, n) for n in found if any(n) for sign in (1, -1)]
+
+
+def around(a: list[Vector], b: list[Vector]) -> list[list[int]]:
+    """The corners of b - a, counter-clockwise."""
+    differences = {sub(q, p): [i, j] for i, p in enumerate(a) for j, q in enumerate(b)}
+    return [differences[corner] for corner in polygon.hull(list(differences))]
 
 
 # ------------------------------------------------------------------------------------------------------- records
@@ -136,17 +146,25 @@ def contact_record(a: Record, b: Record, t_max: float) -> Record:
         claim |= {"time_lower": low, "time": low, "time_upper": high}
         moved = [add(q, scale(found.time, speed)) for q in points_b]
         evidence["simplex"] = simplex_of(points_a, moved)
-    if found.status != "OVERLAPPING":
+    if found.status == "OVERLAPPING":
+        evidence = {"around": around(points_a, points_b)}
+    else:
 
         def proves(n: Vector) -> bool:
             room, closing = gap(n, points_a, points_b), -dot(n, speed)
             if found.status == "NEVER":
                 return room > 0 and (closing <= 0 or room > exact_or_inf(t_max) * closing)
             if found.status == "TOUCHING":
-                return any(n) and room == 0
+                return room == 0
             return room > 0 and closing > 0 and room == found.time * closing
 
-        evidence["axis"] = next(axis for axis, n in axes_of(points_a, points_b, speed) if proves(n))
+        ways = (
+            facet
+            for facet in facets_of(points_a, points_b)
+            if any(map(proves, directions_of(facet, points_a, points_b, speed)))
+        )
+        if facet := next(ways):
+            evidence["facet"] = facet
     return {"query": "first_contact", "a": a, "b": b, "claim": claim, "evidence": evidence}
 
 

@@ -96,8 +96,26 @@ def ridge(rng, angle, gap, ratio):
     box_axes = np.array([edge, (outward + side) / np.sqrt(2), (outward - side) / np.sqrt(2)])
     half = np.array([0.15, 0.05, 0.08])
     center = on_edge + gap * outward + half[1:] @ box_axes[1:]
+    order, signs = rng.permutation(3), rng.choice([-1, 1], (3, 1))
+    return frustum, gs.Boxes([frustum.origin + center @ axes], [signs * (box_axes @ axes)[order]], [half[order]])
+
+
+def needles(rng, count):
+    """Boxes of rounding width along a slanted edge, tilted and displaced by rounding: a rounded axis means nothing."""
+    axes = np.array(FRAMES[rng.integers(3)])
+    left, up = rng.integers(1, 17, 2) / 8
+    frustum = gs.Frustum([0, 0, 0], axes, left, up, 1.0, 4.0)
+    along = np.array([left, up, 1.0]) * [*rng.choice([-1, 1], 2), 1]
+    edge = along / np.linalg.norm(along)
+    side = np.cross(edge, rng.normal(size=3))
+    side /= np.linalg.norm(side)
+    rows = np.array([edge, side, np.cross(edge, side)])
+    ulp = 2.0**-53
+    turned = rows + ulp * rng.integers(-3, 4, (count, 3, 3)) * [[[1], [0], [0]]]
+    center = rng.uniform(1.5, 3.0, (count, 1)).round(3) * along + ulp * rng.integers(-8, 9, (count, 3))
+    half = rng.uniform(0.1, 0.4, (count, 3)) * [1.0, 4.0 * ulp, 4.0 * ulp]
     order = rng.permutation(3)
-    return frustum, gs.Boxes([frustum.origin + center @ axes], [(box_axes @ axes)[order]], [half[order]])
+    return frustum, gs.Boxes(center @ axes, (turned @ axes)[:, order], half[:, order])
 
 
 def window(rng, kind):

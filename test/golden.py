@@ -190,11 +190,13 @@ QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
 
 # -------------------------------------------------------------------------------------------------------- hashing
 
+LAZY = {"_point_a": "point_a", "_normal": "normal"}  #: found on first use
+
 
 def content(answer: Any) -> Iterator[tuple[str, NDArray[Any]]]:
     """Name and values of every array that an answer has; costs are left out."""
-    names = [field.name.lstrip("_") for field in dataclasses.fields(answer)]
-    for name in names:
+    for field in dataclasses.fields(answer):
+        name = LAZY.get(field.name, field.name)
         value = getattr(answer, name)
         if isinstance(value, np.ndarray):
             # Every NaN is the same NaN.

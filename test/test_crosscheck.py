@@ -804,7 +804,7 @@ def test_reports_are_bounded_and_keep_the_unexplained(rng, monkeypatch):
     unexplained = [d.label for d in recent if not d.explained]
     assert unexplained == [str(i) for i in range(40)][-crosscheck.MAX_RECENT :]
     assert any(d.explained for d in recent)
-    assert "UNEXPLAINED" in str(recent[-1]) and "39" in str(recent[-1])
+    assert "THE ENGINE IS WRONG" in str(recent[-1]) and "39" in str(recent[-1])
 
 
 def test_the_documented_table_is_the_one_in_force():

@@ -19,6 +19,7 @@ from cull_scenes import (
     describe,
     exact_state,
     lattice,
+    needles,
     ridge,
     scaled,
     scene,
@@ -221,6 +222,14 @@ def test_near_parallel_edges(angle, ratio, rng):
     for sign, _ in product((1, -1), range(2 * ROUNDS)):
         stages.add(check(*ridge(rng, angle, sign * 10.0 ** rng.uniform(-22, -15), ratio)))
     assert stages["wide"] + stages["exact"] >= 3 * ROUNDS, stages
+
+
+def test_needles_along_edges(rng):
+    """Between bodies whose only separating axis is lost in rounding."""
+    stages = Stages()
+    for _ in range(10 * ROUNDS):
+        stages.add(check(*needles(rng, 12)))
+    assert stages["wide"] + stages["exact"] >= 60 * ROUNDS, stages
 
 
 @pytest.mark.parametrize("name", SCENES)

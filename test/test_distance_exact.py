@@ -22,6 +22,7 @@ from distance_scenes import (
     core,
     hull,
     hull_pair,
+    ordinary_hull,
     random_turn,
     rotation,
 )
@@ -75,6 +76,7 @@ def check(a: Any, b: Any, pose: np.ndarray | None, vertices_a: Any, vertices_b: 
 def check_points(answer: gs.Distances, vertices_a: Any, vertices_b: Any, text: str) -> None:
     """Nearest points are members, their difference is distance times normal, and the normal separates."""
     a, b = (np.array([[float(x) for x in v] for v in vertices]) for vertices in (vertices_a, vertices_b))
+    # Everything in a unit in which nothing over- or underflows, relative to the extent of the scene.
     size = max(np.abs(a).max(), np.abs(b).max(), float(abs(answer.distance[0])), 5e-324)
     unit = 2.0 ** -math.frexp(size)[1] if size > 1e-300 else 2.0**1000
     reach = max(np.ptp(a * unit, axis=0).max(), np.ptp(b * unit, axis=0).max(), abs(answer.distance[0] * unit))
@@ -174,13 +176,11 @@ def test_frusta(other: str, rng: np.random.Generator) -> None:
     for _ in range(25 * SOAK):
         a = random_frustum(rng)
         place = (np.mean(a.corners(), axis=0) + rng.normal(size=3)) * rng.choice([1.0, 1.0, 300.0])
-        move = np.zeros(3)
+        axes, move = rotation(any_turn(rng)).T, np.zeros(3)
+        b: Any = None
         for step in range(2):
-            b: Any
             if other == "boxes":
-                b = gs.Boxes(
-                    [place + move], [rotation(any_turn(rng)).T if step == 0 else b.axes[0]], [[0.5, 0.25, 1.0]]
-                )
+                b = gs.Boxes([place + move], [axes], [[0.5, 0.25, 1.0]])
             elif other == "polytopes":
                 b = gs.Polytopes.from_list([hull(rng, "block") + place if step == 0 else b.vertices + move])
             else:
@@ -217,7 +217,9 @@ def body(rng: np.random.Generator, kind: str) -> Any:
 
 
 def vertices_of(shape: Any) -> list[Any]:
-    """In the shape's own frame, exactly."""
+    """In the shape's own frame, exactly, in the engine's order."""
+    if isinstance(shape, gs.Box):
+        return polytope.box_corners([0, 0, 0], np.eye(3).tolist(), shape.half_extents.tolist())
     return frustum_corners(shape) if isinstance(shape, gs.Frustum) else [vectors.exact(v) for v in core(shape)[0]]
 
 
@@ -242,3 +244,253 @@ def test_shapes_at_poses(kind_a: str, kind_b: str, rng: np.random.Generator) -> 
         pose[:3] += answer.normal[0] * (rng.choice([0.0, 1e-15, -1e-15]) - answer.distance[0])
         tally.see(*check(a, b, pose, vertices_of(a), at_pose(vertices_of(b), pose)))
     tally.require(apart=4, wide=4)
+
+
+# ------------------------------------------------------------------------------------------------ constructed
+
+
+def test_touching_on_a_lattice() -> None:
+    """Face to face, edge to edge, corner to corner, corner in face, edges across: exactly 0, and 2^-51 either side."""
+    turned = [rotation(turn / np.linalg.norm(turn)) for turn in ([0, 0, 0, 1.0], [0.5, 0.5, 0.5, 0.5])]
+    half = np.array([0.5, 0.25, 1.0])
+    steps = [[1, 0.25, 0.5], [1, 0.5, 0.125], [1, 0.5, 2], [0.25, 0.5, 0.5], [0.125, 0.25, 2]]
+    for matrix, step, kind in itertools.product(turned, steps, ("boxes", "polytopes")):
+        for nudge, expected in ((0.0, 0.0), (2.0**-51, 2.0**-51), (-(2.0**-51), -(2.0**-51))):
+            k = next(i for i in range(3) if step[i] == 2 * half[i])
+            moved = np.array(step)
+            moved[k] += nudge
+            bodies = [gs.Boxes([center @ matrix], [matrix], [half]) for center in (np.zeros(3), moved)]
+            corners = [corners_of(x) for x in bodies]
+            if kind == "polytopes":
+                bodies = [gs.Polytopes.from_list([[[float(x) for x in v] for v in body]]) for body in corners]
+            answer, signed = check(*bodies, None, *corners)
+            others = [i for i in range(3) if i != k and step[i] >= 2 * half[i]]
+            if not others:
+                assert answer.distance[0] == expected, (step, nudge)
+            assert (signed > 0) == (nudge > 0)
+
+
+def test_ties_of_depth() -> None:
+    """Concentric cubes, equal or not, turned by a right angle: six facets are as near; the normal is one of them."""
+    for size, turn in itertools.product((1.0, 0.5, 0.1, 3.0), TURNS[:3]):
+        a, b = gs.Box([1.0, 1.0, 1.0]), gs.Box([size] * 3)
+        pose = np.append(np.zeros(3), turn / np.linalg.norm(turn))
+        answer, _ = check(a, b, pose, vertices_of(a), at_pose(vertices_of(b), pose))
+        hulls = [gs.Convex([[float(x) for x in v] for v in vertices_of(x)]) for x in (a, b)]
+        other, _ = check(*hulls, pose, vertices_of(a), at_pose(vertices_of(b), pose))
+        assert answer.distance[0] == other.distance[0]
+        if (turn == TURNS[0]).all():
+            assert answer.distance[0] == -(1.0 + size)
+
+
+def test_flat_bodies_have_no_depth() -> None:
+    """The difference of coplanar bodies has no inside: they touch, or are apart."""
+    triangle = gs.Triangle([0, 0, 0], [1, 0, 0], [0, 1, 0])
+    segment = gs.Segment([0.1, 0.1, 0], [0.3, 0.7, 0])
+    flat = gs.Box([1.0, 1.0, 0.0])
+    for a, b in itertools.product((triangle, segment, flat, gs.Point([0.25, 0.25, 0])), repeat=2):
+        for height in (0.0, 5e-324, -1e-300, 1.0):
+            pose = np.array([0.0, 0.0, height, 0, 0, 0, 1])
+            answer, signed = check(a, b, pose, vertices_of(a), at_pose(vertices_of(b), pose))
+            assert answer.distance[0] == abs(height) or signed > 0
+
+
+def test_tiny_gaps_far_away() -> None:
+    """Gaps of 1e-16 hundreds of metres from the origin, and distances of hundreds of metres."""
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        far = rng.uniform(100, 900, 3)
+        axes = rotation(random_turn(rng)).T
+        a = gs.Boxes([far], [axes], [[0.5, 0.25, 1.0]])
+        center = far + axes[0] * rng.choice([1.0, 1.0, 300.0]) + rng.choice([0.0, 1e-13]) * rng.normal(size=3)
+        b = gs.Boxes([center], [axes], [[0.5, 0.5, 0.5]])
+        check(a, b, None, corners_of(a), corners_of(b))
+
+
+# ------------------------------------------------------------------------------------------------------- laws
+
+
+def numbers(answer: gs.Distances) -> tuple[float, ...]:
+    return tuple(float(x[0]) for x in (answer.distance, answer.lower, answer.upper))
+
+
+def exactly(a: Any, b: Any, pose: np.ndarray | None = None) -> tuple[float, ...]:
+    return numbers(gs.distance(a, b, pose, want=DEEP, accuracy="exact"))
+
+
+def permuted(body: Any, rng: np.random.Generator) -> Any:
+    """The same set of points by other numbers: axes and vertices in another order, turned round."""
+    if isinstance(body, gs.Boxes):
+        order, sign = rng.permutation(3), rng.choice([-1.0, 1.0], (3, 1))
+        return gs.Boxes(body.center, [body.axes[0][order] * sign], body.half_extents[:, order])
+    if isinstance(body, gs.Frustum):
+        (l0, l1, u0, u1), (left, up, view) = body.bounds, body.axes
+        return gs.Frustum(body.origin, [up, -left, view], near=body.near, far=body.far, bounds=(u0, u1, -l1, -l0))
+    return gs.Polytopes.from_list([rng.permutation(np.concatenate([body.vertices, body.vertices[:1]]))])
+
+
+def scaled(body: Any, scale: float) -> Any:
+    if isinstance(body, gs.Boxes):
+        return gs.Boxes(body.center * scale, body.axes, body.half_extents * scale)
+    if isinstance(body, gs.Frustum):
+        window = np.array(body.bounds) * scale
+        return gs.Frustum(body.origin * scale, body.axes, near=body.near * scale, far=body.far * scale, bounds=window)
+    return gs.Polytopes(body.vertices * scale, body.offsets)
+
+
+def shifted(body: Any, step: np.ndarray) -> Any:
+    if isinstance(body, gs.Boxes):
+        return gs.Boxes(body.center + step, body.axes, body.half_extents)
+    if isinstance(body, gs.Frustum):
+        return gs.Frustum(body.origin + step, body.axes, near=body.near, far=body.far, bounds=body.bounds)
+    return gs.Polytopes(body.vertices + step, body.offsets)
+
+
+def on_a_grid(x: Any) -> np.ndarray:
+    """Multiples of 2^-20, so that shifts by whole numbers round nothing."""
+    return np.round(np.asarray(x) * 2.0**20) / 2.0**20
+
+
+def test_laws_hold_to_the_last_bit(rng: np.random.Generator) -> None:
+    """Swap, permutation, scale and translation change no bit of distance, lower and upper."""
+    tally: Counter[str] = Counter()
+    for _ in range(300 * SOAK):
+        bodies = []
+        for kind in rng.integers(3, size=2):
+            place = on_a_grid(rng.normal(size=3) * rng.choice([0.1, 1.0, 3.0]))
+            if kind == 0:
+                bodies.append(gs.Boxes([place], [rotation(any_turn(rng)).T], on_a_grid([rng.uniform(0.2, 1.0, 3)])))
+            elif kind == 1:
+                bodies.append(gs.Polytopes.from_list([on_a_grid(rng.normal(size=(8, 3)) + place)]))
+            else:
+                body = random_frustum(rng)
+                bodies.append(gs.Frustum(place, body.axes, near=body.near, far=body.far, bounds=body.bounds))
+        a, b = bodies
+        one = exactly(a, b)
+        text = reproducer(a=vars(a), b=vars(b))
+        tally["apart" if one[0] > 0 else "overlapping"] += 1
+        assert exactly(b, a) == one, text
+        assert exactly(permuted(a, rng), permuted(b, rng)) == one, text
+        for scale in (2.0**-300, 2.0**-3, 2.0**200, 2.0**600):
+            assert exactly(scaled(a, scale), scaled(b, scale)) == tuple(x * scale for x in one), text
+        step = np.array([2.0**9, -(2.0**7), 3.0])
+        assert exactly(shifted(a, step), shifted(b, step)) == one, text
+    assert min(tally.values()) > 40, tally
+
+
+def test_row_by_row(rng: np.random.Generator) -> None:
+    """A batch answers what its pairs answer alone, one body against many included."""
+    count = 60
+    boxes = gs.Boxes.from_poses(np.c_[rng.normal(size=(count, 3)), [random_turn(rng) for _ in range(count)]], [0.5] * 3)
+    hull_ = gs.Polytopes.from_list([ordinary_hull(rng)])
+    for a, b in ((boxes, hull_), (random_frustum(rng), boxes)):
+        batch = gs.distance(a, b, want=DEEP, accuracy="exact")
+        for i in range(count):
+            one = gs.Boxes(boxes.center[i : i + 1], boxes.axes[i : i + 1], boxes.half_extents[i : i + 1])
+            alone = gs.distance(one if a is boxes else a, one if b is boxes else b, want=DEEP, accuracy="exact")
+            for name in ("distance", "lower", "upper", "normal", "point_a", "point_b"):
+                assert np.array_equal(getattr(batch, name)[i], getattr(alone, name)[0]), name
+        assert sum(batch.cost.counts.get(name, 0) for name in ("filter", "wide", "exact")) == batch.cost.counts["ok"]
+
+
+# --------------------------------------------------------------------------------------------------- evidence
+
+
+def simplex_of(a: Any, b: Any, pose: np.ndarray | None, accuracy: str, penetration: bool) -> list[tuple[int, int]]:
+    if pose is None:
+        side = {gs.Boxes: ("center", "axes", "half_extents"), gs.Polytopes: ("vertices", "offsets")}
+        sides = [
+            (x.packed(),) if isinstance(x, gs.Frustum) else tuple(getattr(x, name) for name in side[type(x)])
+            for x in (a, b)
+        ]
+        found = _core.distance_world(*sides, penetration, accuracy, True)
+    else:
+        frusta = np.array([x.packed() if isinstance(x, gs.Frustum) else np.zeros(18) for x in (a, b)])
+        pairs = np.array([[0, 1]])
+        found = _core.distance_pairs(*pack([a, b]), pairs, pose[None], penetration, accuracy, True, frusta)
+    assert found[8].dtype == np.int32 and found[8].shape == (1, 4, 2)
+    rows = found[8][0].tolist()
+    used = [tuple(row) for row in rows if row[0] >= 0]
+    assert rows[len(used) :] == [[-1, -1]] * (4 - len(used)) and used
+    return used  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("penetration", [False, True])
+def test_the_simplex_proves_the_answer(penetration: bool, rng: np.random.Generator) -> None:
+    """Its least point is 0 where the bodies meet, else as long as the distance."""
+    tally: Counter[str] = Counter()
+    for _ in range(60 * SOAK):
+        k = rng.integers(4)
+        pose = None
+        a: Any
+        b: Any
+        if k == 0:
+            half_a, axes_a, center, half_b, axes_b = box_pair(rng)
+            a, b = gs.Boxes([np.zeros(3)], [axes_a], [half_a]), gs.Boxes([center], [axes_b], [half_b])
+        elif k == 1:
+            a, b = (gs.Polytopes.from_list([x]) for x in hull_pair(rng, HULLS[rng.integers(len(HULLS))]))
+        elif k == 2:
+            a, b = random_frustum(rng), gs.Boxes([rng.normal(size=3)], [rotation(any_turn(rng)).T], [[0.5, 0.2, 0.3]])
+        else:
+            a, b = (body(rng, SHAPES[rng.integers(len(SHAPES))]) for _ in range(2))
+            pose = np.append(rng.normal(size=3), any_turn(rng))
+            pose[3:] /= np.linalg.norm(pose[3:])
+        if pose is None:
+            vertices_a, vertices_b = corners_of(a), corners_of(b)
+        else:
+            vertices_a, vertices_b = vertices_of(a), at_pose(vertices_of(b), pose)
+        least = polytope.squared_distance(vertices_a, vertices_b)
+        for accuracy in ("exact", "float64"):
+            pairs = simplex_of(a, b, pose, accuracy, penetration)
+            points = [vectors.sub(vertices_b[j], vertices_a[i]) for i, j in pairs]
+            square = polytope.squared_distance([(0, 0, 0)], points)
+            if accuracy == "exact":
+                assert square == least, reproducer(a=vars(a), b=vars(b), pose=pose)
+            else:
+                assert least <= square <= (math.sqrt(least) + 1e-12) ** 2, reproducer(a=vars(a), b=vars(b), pose=pose)
+        tally["meet" if least == 0 else "apart"] += 1
+    assert min(tally.values()) > 10, tally
+
+
+# ------------------------------------------------------------------------------------------------------ curved
+
+
+@pytest.mark.parametrize("kind", ["sphere", "capsule"])
+@pytest.mark.parametrize("other", ["sphere", "capsule", "box", "convex", "frustum"])
+def test_curved_shapes(kind: str, other: str, rng: np.random.Generator) -> None:
+    """The core's distance is exact and the radii are taken off outwards: two or three doubles are left."""
+    tally: Counter[str] = Counter()
+    for _ in range(20 * SOAK):
+        a = gs.Sphere(rng.choice([0.5, 0.1])) if kind == "sphere" else gs.Capsule(rng.choice([0.5, 0.1]), 2.0)
+        b = body(rng, other) if other not in ("sphere", "capsule") else (
+            gs.Sphere(0.25) if other == "sphere" else gs.Capsule(0.3, 1.0)
+        )  # fmt: skip
+        if rng.random() < 0.5:
+            a, b = b, a
+        place = rng.choice([0.0, 0.25, 0.75, rng.normal()], 3) * rng.choice([1.0, 4.0], p=[0.7, 0.3])
+        middles = [np.mean([[float(x) for x in v] for v in vertices_of(body)], axis=0) for body in (a, b)]
+        pose = np.append(place + middles[0] - middles[1], any_turn(rng))
+        pose[3:] /= np.linalg.norm(pose[3:])
+        square = polytope.separation(vertices_of(a), at_pose(vertices_of(b), pose)).signed_square
+        radii = sum(Fraction(getattr(x, "radius", 0.0)) for x in (a, b))
+        answer = gs.distance(a, b, pose, want=DEEP, accuracy="exact")
+        text = reproducer(a=vars(a), b=vars(b), pose=pose)
+        lower, upper = (Fraction(float(x[0])) for x in (answer.lower, answer.upper))
+        assert vectors.compare_root(lower + radii, square) <= 0 <= vectors.compare_root(upper + radii, square), text
+        size = max(float(upper), float(radii), 1.0, math.sqrt(abs(square)))
+        assert upper - lower <= 2 * Fraction(math.ulp(size)) and lower <= Fraction(answer.distance[0]) <= upper, text
+        meet = gs.intersects(a, b, pose, accuracy="exact")
+        truth = vectors.compare_root(radii, square) >= 0
+        tally["certain"] += bool(meet.certain[0])
+        assert not meet.certain[0] or meet.value[0] == truth, text
+        tally["meet" if truth else "apart"] += 1
+    assert tally["certain"] >= 19 * SOAK and tally["meet"] >= 2 <= tally["apart"], tally
+
+
+def test_spheres_that_touch_are_known_to() -> None:
+    for a, b, x in ((0.5, 0.25, 0.75), (1.0, 2.0, 3.0)):
+        pose = [x, 0, 0, 0, 0, 0, 1]
+        answer = gs.distance(gs.Sphere(a), gs.Sphere(b), pose, accuracy="exact")
+        assert numbers(answer) == (0.0, 0.0, 0.0)
+        meet = gs.intersects(gs.Sphere(a), gs.Sphere(b), pose, accuracy="exact")
+        assert meet.value[0] and meet.certain[0]

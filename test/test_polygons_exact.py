@@ -357,7 +357,9 @@ def test_large_polygons(rng):
     """Beyond some size supports are found by walking."""
     for count_a, count_b in ((40, 33), (90, 12)):
         rings = [
-            hull(np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n]))
+            hull(
+                np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n])
+            )
             for n in (count_a, count_b)
         ]
         for offset, velocity in (((9.0, 1.0), (-1.0, 0.1)), ((5.9, 0.0), (-1.0, 0.1)), ((0.5, 0.25), (1.0, 2.0))):
@@ -482,9 +484,10 @@ def test_law_time_reversal(scenes):
     for a, va, b, vb, _ in ends[:150]:
         truth = exact.first_contact(a, va, b, vb, INF)
         late = math.ceil(truth.last_time) + 1
-        end = [(float(x + late * va[0]), float(y + late * va[1])) for x, y in a], [
-            (float(x + late * vb[0]), float(y + late * vb[1])) for x, y in b
-        ]
+        end = (
+            [(float(x + late * va[0]), float(y + late * va[1])) for x, y in a],
+            [(float(x + late * vb[0]), float(y + late * vb[1])) for x, y in b],
+        )
         back = contacts([(end[0], tuple(-c for c in va), end[1], tuple(-c for c in vb), INF)])
         assert back.status[0] == gs.WILL_TOUCH
         assert back.time[0] == nearest_double(late - truth.last_time)
@@ -521,3 +524,60 @@ def test_what_is_certain_at_float64_is_so(rng, kind):
             reached["all"] += len(batch)
     assert min(reached[k] for k in (gs.NEVER, gs.WILL_TOUCH, gs.OVERLAPPING)) >= 20, reached
     assert reached["certain"] >= 0.4 * reached["all"], reached
+
+
+def tight(lower, upper):
+    """How wide intervals are, relatively."""
+    return (upper - lower) / np.maximum(np.abs(lower), np.abs(upper))
+
+
+@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("kind", SCENES)
+def test_what_lower_tiers_prove_of_contacts(rng, kind, tier):
+    """Nothing is missed, what is certain is so, and times are within their bounds."""
+    reached = Counter()
+    for t_max in (INF, 2.0, 0.0):
+        scenes = [(*SCENES[kind](rng), t_max) for _ in range(200)]
+        for scale in ((0, 0), (-900, -600), (0, -950), (900, 900)):
+            batch = [scaled(scene[:4], *scale, t_max) for scene in scenes]
+            truth, answer = contacts(batch), contacts(batch, tier)
+            assert answer.cost.counts == {("bound" if tier == "bound" else "filter"): len(batch)}
+            for i, scene in enumerate(batch):
+                given = reproducer(scene=scene)
+                status, expected = answer.status[i], truth.status[i]
+                reached[int(status)] += 1
+                reached["certain"] += answer.certain[i]
+                if answer.certain[i]:
+                    assert status == expected, given
+                if status == gs.NEVER:
+                    assert answer.certain[i] and np.isnan(answer.time[i]), given
+                    continue
+                lower, time, upper, last = (
+                    float(x[i]) for x in (answer.time_lower, answer.time, answer.time_upper, answer.last_time)
+                )
+                assert 0.0 <= lower <= time <= upper <= scene[4] and time <= last <= scene[4], given
+                if expected != gs.NEVER:
+                    assert lower <= truth.time_upper[i] and truth.time_lower[i] <= upper, given
+                if tier == "bound":
+                    assert status in (gs.WILL_TOUCH, gs.TOUCHING) and time == lower, given
+                    assert upper == last >= (truth.last_time[i] if expected != gs.NEVER else 0.0), given
+    assert min(reached[gs.NEVER], reached["certain"], reached[gs.WILL_TOUCH]) >= 50, reached
+
+
+@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("kind", SCENES)
+def test_what_lower_tiers_prove_of_distances(rng, kind, tier):
+    scenes = [SCENES[kind](rng) for _ in range(200)]
+    for length in (0, -1000, 900):
+        batch = [scaled(scene, length, 0, INF) for scene in scenes]
+        a, b = polygons(*(s[0] for s in batch)), polygons(*(s[2] for s in batch))
+        for want in ((), ("penetration",)):
+            truth, answer = (gs.distance(a, b, accuracy=t, want=want) for t in ("exact", tier))
+            assert (answer.lower <= answer.distance).all() and (answer.distance <= answer.upper).all()
+            assert (answer.lower <= truth.upper).all() and (truth.lower <= answer.upper).all()
+            assert tier != "bound" or (answer.distance == answer.lower).all()
+        truth, answer = (gs.intersects(a, b, accuracy=t) for t in ("exact", tier))
+        sure = answer.certain
+        np.testing.assert_array_equal(answer.value[sure], truth.value[sure])
+        assert (answer.value | ~truth.value).all()  # never a miss
+        assert sure.sum() >= 10

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "numerics.md"
 BEGIN, END = "<!-- tolerances: begin -->", "<!-- tolerances: end -->"
 
-CPP = re.compile(r"^(?:inline |static )*constexpr double (k[A-Z]\w*) = ([^;]+);\s*(?://+<? ?(.*))?$")
+CPP = re.compile(r"^(?:inline |static )*constexpr (?:double|Real) (k[A-Z]\w*) = ([^;]+);\s*(?://+<? ?(.*))?$")
 PYTHON = re.compile(r"^(_?[A-Z][A-Z_0-9]+)(?:: \w+)? = ([-\d.(][^#]*|[A-Z_.\d* ()+-]*ROUND\w*[^#]*)(?:#:? ?(.*))?$")
 # Plain facts about float64, and numbers that decide nothing about an answer.
 NOT_TOLERANCES = re.compile(
@@ -35,6 +35,8 @@ def tolerances(path: Path) -> list[tuple[str, str, str]]:
         text = line.strip()
         if text.startswith(mark) and not text.startswith("#include"):
             comment.append(text.lstrip("/#:< ").strip())
+            continue
+        if text.startswith("template <"):  # between a comment and its constant
             continue
         match = pattern.match(line if python else text)
         if match and not NOT_TOLERANCES.search(match[1]) and not NOT_REAL.search(match[2].strip()):

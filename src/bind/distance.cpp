@@ -10,6 +10,7 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
+#include <typeinfo>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -124,13 +125,16 @@ public:
         for (std::size_t i = 0; i < count; ++i) {
             ShapeView shape{static_cast<ShapeKind>(kinds[i]), params + 4 * i, vertices + 3 * offsets[i],
                             static_cast<std::ptrdiff_t>(offsets[i + 1] - offsets[i])};
+            if (frusta != nullptr && frusta[18 * i + 17] > 0.0) {
+                PlacedFrustum& own = frusta_[i];
+                own.frustum = unpacked_frustum(frusta + 18 * i);
+                own.corners = rounded_corners(own.frustum, false);
+                own.params[0] = own.corners.error;
+                shape = {ShapeKind::convex, own.params, own.corners.vertices, 8, nullptr, &own.frustum};
+            }
             if (shape.kind == ShapeKind::convex) {
                 extents_[i] = extent_of(shape);
                 shape.extent = &extents_[i];
-            }
-            if (frusta != nullptr) {
-                frusta_[i] = unpacked_frustum(frusta + 18 * i);
-                shape.frustum = frusta_[i].far > 0.0 ? &frusta_[i] : nullptr;
             }
             shapes_.push_back(shape);
         }
@@ -139,8 +143,14 @@ public:
     const ShapeView& shape(std::int64_t i) const { return shapes_[static_cast<std::size_t>(i)]; }
 
 private:
+    struct PlacedFrustum {
+        Frustum frustum;
+        RoundedCorners corners;
+        double params[4] = {};
+    };
+
     std::vector<HullExtent> extents_;
-    std::vector<Frustum> frusta_;
+    std::vector<PlacedFrustum> frusta_;
     std::vector<ShapeView> shapes_;
 };
 
@@ -257,17 +267,19 @@ struct HullRows {
     }
 };
 
-/// A frustum as packed (18,), its corners relative to the apex (8, 3), and how far each may be off (1,).
+/// A frustum, packed (18,).
 class OneFrustum {
 public:
-    OneFrustum(const Input<double, nb::shape<18>>& packed, Rows3 corners, const Values& error)
-        : frustum_(unpacked_frustum(packed.data())), corners_(std::move(corners)), params_{error.data()[0]} {}
+    explicit OneFrustum(const Input<double, nb::shape<18>>& packed)
+        : frustum_(unpacked_frustum(packed.data())),
+          corners_(rounded_corners(frustum_, true)),
+          params_{corners_.error} {}
 
     std::size_t count() const { return 1; }
-    bool consistent() const { return corners_.shape(0) == 8; }
-    std::size_t scratch_size() const { return 3 * corners_.shape(0); }
+    bool consistent() const { return true; }
+    std::size_t scratch_size() const { return 24; }
     WorldBody body(std::size_t, HullExtent& extent) const {
-        WorldBody out = hull_body(corners_.data(), 8, extent);
+        WorldBody out = hull_body(corners_.vertices, 8, extent);
         out.hull.params = params_;
         out.hull.frustum = &frustum_;
         out.origin = frustum_.origin;
@@ -276,7 +288,7 @@ public:
 
 private:
     Frustum frustum_;
-    Rows3 corners_;
+    RoundedCorners corners_;
     double params_[4];
 };
 
@@ -309,14 +321,22 @@ private:
     }
 
     static Rows rows_of(const nb::tuple& arrays) {
-        if (arrays.size() == 2) {
-            return HullRows{as<Rows3>(arrays[0]), as<Offsets>(arrays[1])};
+        try {
+            switch (arrays.size()) {
+                case 1:
+                    return OneFrustum(as<Input<double, nb::shape<18>>>(arrays[0]));
+                case 2:
+                    return HullRows{as<Rows3>(arrays[0]), as<Offsets>(arrays[1])};
+                case 3:
+                    return BoxRows{as<Rows3>(arrays[0]), as<Matrices3>(arrays[1]), as<Rows3>(arrays[2])};
+                default:
+                    break;
+            }
+        } catch (const std::bad_cast&) {
+            // Said below, with the rest.
         }
-        if (as<nb::ndarray<nb::ro>>(arrays[0]).ndim() == 1) {
-            return OneFrustum(as<Input<double, nb::shape<18>>>(arrays[0]), as<Rows3>(arrays[1]),
-                              as<Values>(arrays[2]));
-        }
-        return BoxRows{as<Rows3>(arrays[0]), as<Matrices3>(arrays[1]), as<Rows3>(arrays[2])};
+        throw nb::type_error("distance: a side must be (center, axes, half_extents), (vertices, offsets) or "
+                             "(packed frustum,)");
     }
 
     Rows rows_;

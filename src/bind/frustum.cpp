@@ -69,6 +69,10 @@ GEOMSRV_INLINE std::array<L, 3> local_rows(const CullPlanes<L>& planes, const do
     }
 }
 
+// Boxes that are looked at together, so that what one stage leaves is still in cache for the next; and how
+// far ahead axes are fetched, which come from far away and are wanted of few.
+constexpr std::size_t kBlock = 256, kAhead = 8;
+
 enum class CullTier : std::uint8_t { bound, float32, float64, exact };
 
 struct CullCounts {
@@ -80,13 +84,12 @@ struct CullAnswers {
     bool* certain;
 };
 
-/// As many boxes as there are lanes, from `first`.
+/// As many boxes as there are lanes.
 template <class L>
-GEOMSRV_INLINE void classify_rows(const CullPlanes<L>& planes, const double* center,
-                                  const double* half_extents, std::uint8_t* state) {
-    store_bytes(classify_by_sphere(planes, local_rows(planes, center, planes.origin),
-                                   local_rows(planes, half_extents, Vec3{})),
-                state);
+GEOMSRV_INLINE SphereVerdict<L> classify_rows(const CullPlanes<L>& planes, const double* center,
+                                              const double* half_extents) {
+    return classify_by_sphere(planes, local_rows(planes, center, planes.origin),
+                              local_rows(planes, half_extents, Vec3{}));
 }
 
 /// The same for the last few boxes, which fill the lanes by repetition.
@@ -101,15 +104,13 @@ GEOMSRV_INLINE void classify_last_rows(const CullPlanes<L>& planes, BoxRows boxe
         std::copy_n(boxes.center + i, 3, center + 3 * k);
         std::copy_n(boxes.half_extents + i, 3, half_extents + 3 * k);
     }
-    classify_rows(planes, center, half_extents, found);
+    store_bytes(classify_rows(planes, center, half_extents).state, found);
     std::copy_n(found, count - first, state + first);
 }
 
-/// Block by block, so that what one stage leaves is still in cache for the next.
 template <class L, CullTier Tier>
 GEOMSRV_WIDE_CLONES CullCounts cull_all(const Frustum& frustum, BoxRows boxes, std::size_t count,
                                         CullAnswers out) {
-    constexpr std::size_t kBlock = 256, kAhead = 8;
     const CullPlanes<L> planes = cull_planes<L>(frustum);
     const auto frame = cull_frame<typename L::Real>(frustum);
     std::optional<ExactCull> exact;  // made when first needed
@@ -119,8 +120,8 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const Frustum& frustum, BoxRows boxes, s
         const std::size_t end = std::min(begin + kBlock, count);
         std::size_t first = begin;
         for (; first + L::kCount <= end; first += L::kCount) {
-            classify_rows(planes, boxes.center + 3 * first, boxes.half_extents + 3 * first,
-                          out.state + first);
+            store_bytes(classify_rows(planes, boxes.center + 3 * first, boxes.half_extents + 3 * first).state,
+                        out.state + first);
         }
         if (first < end) classify_last_rows(planes, boxes, first, count, out.state);
         std::size_t left = 0;
@@ -139,7 +140,6 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const Frustum& frustum, BoxRows boxes, s
         } else {
             const std::size_t after_spheres = std::exchange(left, 0);
             for (std::size_t k = 0; k < after_spheres; ++k) {
-                // Axes come from far away, and only these are wanted.
                 boxes.prefetch_axes(undecided[std::min(k + kAhead, after_spheres - 1)]);
                 const std::size_t i = undecided[k];
                 out.state[i] = classify_by_planes(planes, boxes[i]);
@@ -167,16 +167,38 @@ GEOMSRV_WIDE_CLONES CullCounts cull_all(const Frustum& frustum, BoxRows boxes, s
 }
 
 /// CullEvidence of every certain answer, (n, 4, 2) and (n, 2); -1 throughout for the others.
-void find_evidence(const Frustum& frustum, BoxRows boxes, std::size_t count, CullAnswers answers,
-                   std::int32_t* simplex, std::int8_t* beyond) {
-    constexpr std::size_t kAhead = 8;
+GEOMSRV_WIDE_CLONES void find_evidence(const Frustum& frustum, BoxRows boxes, std::size_t count,
+                                       CullAnswers answers, std::int32_t* simplex, std::int8_t* beyond) {
+    const CullPlanes<Lanes> planes = cull_planes<Lanes>(frustum);
     CullWitness witness(frustum);
-    for (std::size_t i = 0; i < count; ++i) {
-        boxes.prefetch_axes(std::min(i + kAhead, count - 1));
-        CullEvidence found;
-        if (answers.certain[i]) found = witness.evidence(boxes[i], static_cast<CullState>(answers.state[i]));
-        std::memcpy(simplex + 8 * i, found.simplex, sizeof found.simplex);
-        std::memcpy(beyond + 2 * i, found.beyond, sizeof found.beyond);
+    std::fill_n(simplex, 8 * count, -1);
+    std::fill_n(beyond, 2 * count, std::int8_t{-1});
+    std::size_t left[kBlock];
+    for (std::size_t begin = 0; begin < count; begin += kBlock) {
+        const std::size_t end = std::min(begin + kBlock, count);
+        std::size_t after_spheres = 0;
+        Lanes plane;  // that spheres lie beyond
+        for (std::size_t i = begin; i < end; ++i) {
+            const int lane = static_cast<int>(i % Lanes::kCount);
+            if (lane == 0) {
+                plane = i + Lanes::kCount <= count
+                            ? classify_rows(planes, boxes.center + 3 * i, boxes.half_extents + 3 * i).plane
+                            : Lanes(planes.kCount);
+            }
+            const bool outside = answers.state[i] == static_cast<std::uint8_t>(CullState::outside);
+            const bool inside = answers.state[i] == static_cast<std::uint8_t>(CullState::inside);
+            const bool by_sphere = outside && answers.certain[i] && plane[lane] < planes.kCount;
+            beyond[2 * i + 1] = static_cast<std::int8_t>(by_sphere ? plane[lane] : -1.0);
+            left[after_spheres] = i;
+            after_spheres += answers.certain[i] && !inside && !by_sphere ? 1 : 0;
+        }
+        for (std::size_t k = 0; k < after_spheres; ++k) {
+            boxes.prefetch_axes(left[std::min(k + kAhead, after_spheres - 1)]);
+            const std::size_t i = left[k];
+            const CullEvidence found = witness.evidence(boxes[i], static_cast<CullState>(answers.state[i]));
+            std::memcpy(simplex + 8 * i, found.simplex, sizeof found.simplex);
+            std::memcpy(beyond + 2 * i, found.beyond, sizeof found.beyond);
+        }
     }
 }
 
@@ -216,7 +238,7 @@ void define_frustum(nb::module_& m) {
                 simplex.array, beyond.array);
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
-        nb::arg("half_extents").noconvert(), nb::arg("accuracy") = "float64", nb::arg("evidence") = false);
+        nb::arg("half_extents").noconvert(), nb::arg("accuracy"), nb::arg("evidence"));
 }
 
 }  // namespace geomsrv::bind

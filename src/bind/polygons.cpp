@@ -10,6 +10,7 @@
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
 #include "geom/polygon.hpp"
+#include "geom/polygon_bound.hpp"
 #include "geom/polygon_distance.hpp"
 #include "geom/polygon_distance_exact.hpp"
 #include "geom/polygon_first_contact.hpp"
@@ -116,7 +117,7 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
         points.insert(points.end(), contact.points.begin(), contact.points.end());
         rows.point_offsets[i + 1] = static_cast<std::int64_t>(points.size());
         rows.certain[i] = contact.certain;
-        ++counts[static_cast<std::size_t>(contact.rung) - 1];
+        ++counts[static_cast<std::size_t>(contact.rung)];
     }
     return points;
 }
@@ -170,8 +171,11 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
 }
 
 /// Calls `work` with the solver of a tier.
-template <class Float64, class Exact, class Work>
+template <class Bound, class Float64, class Exact, class Work>
 auto at_tier(std::string_view accuracy, const Work& work) {
+    if (accuracy == "bound") {
+        return work(std::type_identity<Bound>{});
+    }
     if (accuracy == "exact") {
         return work(std::type_identity<Exact>{});
     }
@@ -232,8 +236,8 @@ void define_polygons(nb::module_& m) {
             std::vector<Vec2> found;
             {
                 const nb::gil_scoped_release unlocked;
-                found =
-                    at_tier<FirstContactSolver, ExactFirstContactSolver>(accuracy, [&]<class S>(S /*tier*/) {
+                found = at_tier<BoundFirstContactSolver, FirstContactSolver, ExactFirstContactSolver>(
+                    accuracy, [&]<class S>(S /*tier*/) {
                         return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
                     });
             }
@@ -274,7 +278,7 @@ void define_polygons(nb::module_& m) {
             RungCounts counts{};
             {
                 const nb::gil_scoped_release unlocked;
-                at_tier<PolygonDistanceSolver, ExactPolygonDistanceSolver>(
+                at_tier<BoundPolygonDistanceSolver, PolygonDistanceSolver, ExactPolygonDistanceSolver>(
                     accuracy, [&]<class S>(S /*tier*/) {
                         distances<typename S::type>(a, b, penetration, rows, counts);
                     });

@@ -49,8 +49,8 @@ struct FourRows {
             at[2] = Lanes(__builtin_shufflevector(zx.v, yz.v, 0, 5, 2, 7));
         } else {
             for (std::size_t k = 0; k < Dimension; ++k) {
-                at[k] = Lanes(
-                    Lanes::Vector{p[k], p[k + Dimension], p[k + 2 * Dimension], p[k + 3 * Dimension]});
+                at[k] =
+                    Lanes(Lanes::Vector{p[k], p[k + Dimension], p[k + 2 * Dimension], p[k + 3 * Dimension]});
             }
         }
     }

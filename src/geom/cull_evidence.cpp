@@ -25,20 +25,31 @@ double length_of(Vec3 v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.
 /// Of a box over the planes, in doubles.
 struct CullWitness::Heights {
     static constexpr int kLanes = CullPlanes<Lanes>::kGroups * Lanes::kCount;
-    double center[kLanes], arm[3][kLanes], half_width[kLanes], error[kLanes];
+    double center[kLanes], arm[3][kLanes], error[kLanes];
+    int beyond = kPlanes;       ///< a plane that the box is proven to lie beyond
+    int across = kPlanes;       ///< a plane that a corner is proven to lie beyond
+    bool center_inside = true;  ///< proven
 
     GEOMSRV_INLINE Heights(const CullPlanes<Lanes>& planes, const OrientedBox& given) {
         const LocalBox<double> box(planes, given);
+        Lanes number(Lanes::Vector{0.0, 1.0, 2.0, 3.0}), first_beyond = kLanes, first_across = kLanes;
         for (int g = 0; g < CullPlanes<Lanes>::kGroups; ++g) {
             const PlaneHeights<Lanes> over = heights_over(planes.group[g], box);
+            // Out of range nothing is certain.
+            const Lanes bound = box.in_range ? over.error : Lanes(std::numeric_limits<double>::infinity());
+            const Lanes s = over.center, r = over.half_width();
+            first_beyond = lesser(first_beyond, select(bound < s - r, number, Lanes(kLanes)));
+            first_across = lesser(first_across, select(bound < s + r, number, Lanes(kLanes)));
+            center_inside &= all(s < -bound);
             const int first = g * Lanes::kCount;
-            over.center.store(center + first);
+            s.store(center + first);
             for (int i = 0; i < 3; ++i) over.arm[i].store(arm[i] + first);
-            over.half_width().store(half_width + first);
-            over.error.store(error + first);
+            bound.store(error + first);
+            number = number + Lanes(Lanes::kCount);
         }
-        // Out of range nothing is certain.
-        if (!box.in_range) std::fill_n(error, kLanes, std::numeric_limits<double>::infinity());
+        // The last lanes repeat the first planes.
+        beyond = static_cast<int>(least(first_beyond));
+        across = static_cast<int>(least(first_across));
     }
 
     [[nodiscard]] double corner(int plane, int number) const {
@@ -51,27 +62,35 @@ struct CullWitness::Heights {
         for (int i = 0; i < 3; ++i) number |= (arm[i][plane] > 0.0 ? 1 : 0) << i;
         return number;
     }
+    [[nodiscard]] bool below(int plane, int number) const { return corner(plane, number) < -error[plane]; }
+    [[nodiscard]] bool above(int plane, int number) const { return corner(plane, number) > error[plane]; }
 };
 
 CullWitness::CullWitness(const Frustum& frustum)
     : frustum_(frustum), planes_(cull_planes<Lanes>(frustum)), exact_(frustum) {}
 
-CullEvidence CullWitness::evidence(const OrientedBox& box, CullState state) {
+GEOMSRV_WIDE_CLONES CullEvidence CullWitness::evidence(const OrientedBox& box, CullState state) {
     CullEvidence out;
     if (state == CullState::inside) return out;
     const Heights over(planes_, box);
+    if (state == CullState::outside) {
+        if (over.beyond >= kPlanes) return beyond_filter(box, state, over);
+        out.beyond[1] = static_cast<std::int8_t>(over.beyond);
+        return out;
+    }
+    if (over.across >= kPlanes || !over.center_inside) return beyond_filter(box, state, over);
+    out.beyond[0] = static_cast<std::int8_t>(over.highest_corner(over.across));
+    out.beyond[1] = static_cast<std::int8_t>(over.across);
+    return out;
+}
 
-    // First what doubles can prove, then what is left to exact signs.
+CullEvidence CullWitness::beyond_filter(const OrientedBox& box, CullState state, const Heights& over) {
+    CullEvidence out;
     if (state == CullState::outside) {
         for (int plane = 0; plane < kPlanes; ++plane) {
-            if (over.center[plane] - over.half_width[plane] > over.error[plane]) {
-                out.beyond[1] = static_cast<std::int8_t>(plane);
-                return out;
-            }
-        }
-        for (int plane = 0; plane < kPlanes; ++plane) {
-            if (over.center[plane] - over.half_width[plane] < -over.error[plane]) continue;
-            if (exact_.sign(box, [&](const auto& signs) { return signs.separates(plane); }) == 1) {
+            const int lowest = kCorners - 1 - over.highest_corner(plane);
+            if (!over.below(plane, lowest) &&
+                exact_.sign(box, [&](const auto& signs) { return signs.separates(plane); }) == 1) {
                 out.beyond[1] = static_cast<std::int8_t>(plane);
                 return out;
             }
@@ -89,29 +108,22 @@ CullEvidence CullWitness::evidence(const OrientedBox& box, CullState state) {
         return true;
     };
     const auto find_corner_beyond = [&] {
-        for (int plane = 0; plane < kPlanes; ++plane) {
-            const int corner = over.highest_corner(plane);
-            if (over.corner(plane, corner) > over.error[plane]) return set_beyond(corner, plane);
-        }
+        if (over.across < kPlanes) return set_beyond(over.highest_corner(over.across), over.across);
         for (int plane = 0; plane < kPlanes; ++plane) {
             for (int corner = 0; corner < kCorners; ++corner) {
-                if (over.corner(plane, corner) < -over.error[plane]) continue;
-                if (corner_sign(plane, corner) == 1) return set_beyond(corner, plane);
+                if (!over.below(plane, corner) && corner_sign(plane, corner) == 1)
+                    return set_beyond(corner, plane);
             }
         }
         return false;
     };
     find_corner_beyond();
-
-    bool center_inside = true;
-    for (int plane = 0; plane < kPlanes; ++plane) center_inside &= over.center[plane] < -over.error[plane];
-    if (center_inside) return out;
+    if (over.center_inside) return out;
     for (int corner = 0; corner < kCorners; ++corner) {
         bool inside = true;
-        for (int plane = 0; plane < kPlanes && inside; ++plane)
-            inside = !(over.corner(plane, corner) > over.error[plane]);
+        for (int plane = 0; plane < kPlanes && inside; ++plane) inside = !over.above(plane, corner);
         for (int plane = 0; plane < kPlanes && inside; ++plane) {
-            inside = over.corner(plane, corner) < -over.error[plane] || corner_sign(plane, corner) <= 0;
+            inside = over.below(plane, corner) || corner_sign(plane, corner) <= 0;
         }
         if (inside) {
             out.simplex[0][1] = corner;
@@ -126,11 +138,13 @@ void CullWitness::find_separation(const OrientedBox& box, CullEvidence& out) con
     const Frustum& f = frustum_;
     const auto [left, up, view] = f.axes.row;
     // Seen from the apex, in a unit that makes the larger of the two about 1.
-    const double shrink = std::max(length_of(0.25 * box.center), length_of(0.25 * f.origin)) > 0x1p1018 ? 0.25 : 1.0;
+    const double shrink =
+        std::max(length_of(0.25 * box.center), length_of(0.25 * f.origin)) > 0x1p1018 ? 0.25 : 1.0;
     const Vec3 offset = shrink * box.center - shrink * f.origin;
-    const double slope = std::max({std::fabs(f.l0), std::fabs(f.l1), std::fabs(f.u0), std::fabs(f.u1)}) / f.near;
-    const double most = std::max({length_of(offset), length_of(shrink * box.half_extents), shrink * f.far,
-                                  shrink * f.far * slope});
+    const double slope =
+        std::max({std::fabs(f.l0), std::fabs(f.l1), std::fabs(f.u0), std::fabs(f.u1)}) / f.near;
+    const double most = std::max(
+        {length_of(offset), length_of(shrink * box.half_extents), shrink * f.far, shrink * f.far * slope});
     const PowerOfTwo unit(std::clamp(-std::ilogb(std::min(most, 0x1p1020)), -1000, 1000));
 
     double corners[3 * kCorners];

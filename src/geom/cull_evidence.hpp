@@ -35,6 +35,7 @@ public:
 
 private:
     struct Heights;
+    CullEvidence beyond_filter(const OrientedBox& box, CullState state, const Heights& over);
     void find_separation(const OrientedBox& box, CullEvidence& out) const;
 
     Frustum frustum_;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "geom/bounding_distance.hpp"
 #include "geom/convex_convex.hpp"
 #include "geom/exact_convex.hpp"
 #include "geom/half_space_pairs.hpp"
@@ -150,10 +151,13 @@ Separation with_radii(const CoreSeparation& core, double radius_a, double radius
         out.lower = reduced_core.lower;
         out.upper = reduced_core.upper;
     }
-    out.normal = core.normal;
+    if (core.rung == Rung::bound) {
+        out.distance = out.lower;
+    }
+    const bool apart = penetration || out.distance > 0.0;
+    out.normal = core.rung == Rung::bound && !apart ? nan_vector() : core.normal;
     out.point_a = core.point_a + origin;
     out.point_b = core.point_b + origin;
-    const bool apart = penetration || out.distance > 0.0;
     if (apart && radii > 0.0) {
         out.point_a = core.point_a + radius_a * core.normal + origin;
         out.point_b = core.point_b - radius_b * core.normal + origin;
@@ -251,11 +255,17 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
     const auto place_both = [&](const LocalFrame& f) {
         return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
     };
+    const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
     const auto solve = [&](const LocalPair& pair) {
+        // Half spaces are their own bounding volumes.
+        if (wanted.tier == Tier::bound && kernel != kUnsup && kernel != half_half) {
+            const LocalPair sorted = flip ? LocalPair{pair.b, pair.a} : pair;
+            return unbounded ? bounding_distance(sorted.a.core, sorted.b.half_space)
+                             : bounding_distance(sorted.a.core, sorted.b.core);
+        }
         return flip ? kernel(pair.b, pair.a, wanted.penetration) : kernel(pair.a, pair.b, wanted.penetration);
     };
     const auto magnitude = [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); };
-    const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
     if (wanted.tier == Tier::exact && kernel != kUnsup && !unbounded) {
         const Transform X_a;
         const ExactBody exact_a = exact_body(a, X_a);
@@ -291,8 +301,6 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& 
     };
     LocalFrame frame;
     frame.origin = a.is_box ? a.box.center : a.origin + middle_of(a.hull);
-    const ExactBody exact_a = exact_body(a);
-    const ExactBody exact_b = exact_body(b);
     const CoreSeparation core = solve_in_range(
         frame,
         [&](const LocalFrame& f) {
@@ -302,9 +310,12 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& 
         [&] { return std::max(magnitude(a), magnitude(b)); },
         [&](const LocalPair& pair, double scale) {
             if (wanted.tier == Tier::exact) {
-                return exact_convex_convex({exact_a, pair.a.core}, {exact_b, pair.b.core}, scale, wanted);
+                return exact_convex_convex({exact_body(a), pair.a.core}, {exact_body(b), pair.b.core}, scale,
+                                           wanted);
             }
-            CoreSeparation out = convex_convex(pair.a.core, pair.b.core, wanted.penetration);
+            CoreSeparation out = wanted.tier == Tier::bound
+                                     ? bounding_distance(pair.a.core, pair.b.core)
+                                     : convex_convex(pair.a.core, pair.b.core, wanted.penetration);
             unscale(out, scale);
             return out;
         });

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "geom/double_double.hpp"
 #include "geom/exact_number.hpp"
@@ -69,6 +70,14 @@ inline Enclosed operator*(const Enclosed& a, const Enclosed& b) {
             ((size_a * b.error + size_b * a.error) + (a.error * b.error + rounding)) * kBoundRounding +
                 (whole ? 0.0 : kEnclosedUnderflow)};
 }
+
+/// The product of two doubles, in the arithmetic named.
+inline Enclosed product_of(double a, double b, std::type_identity<Enclosed>) {
+    const DoubleDouble product = two_product(a, b);
+    const bool kept = std::fabs(product.hi) > kSurelyNormal || a == 0.0 || b == 0.0;
+    return {product, kept ? 0.0 : kEnclosedUnderflow};
+}
+inline Exact product_of(double a, double b, std::type_identity<Exact>) { return Exact(a) * Exact(b); }
 
 /// 2 a, which rounds nothing.
 inline Enclosed twice(const Enclosed& a) { return {{2.0 * a.value.hi, 2.0 * a.value.lo}, 2.0 * a.error}; }

@@ -23,7 +23,7 @@ constexpr double kDoubtfulSine = 0x1p-40;
 struct Generator {
     const ExactBody* body = nullptr;
     int index = 0;
-    bool of_b = false;
+
     Vec3 rough;
     double length = 0.0;
     int line = 0;  ///< first generator that is literally parallel to this one
@@ -42,7 +42,7 @@ struct Candidate {
 /// gap^2 = numerator^2 / denominator.
 template <class N>
 struct Gap {
-    VectorOf<N> normal;  ///< not normalised, on the side of the first sign known
+    VectorOf<N> normal;  ///< not normalised, from a to b as far as that is known
     N numerator;
     N denominator;
 };
@@ -50,16 +50,27 @@ struct Gap {
 class Axes {
 public:
     Axes(const ExactAndRough& a, const ExactAndRough& b, bool in_range) : a_(a), b_(b), in_range_(in_range) {
-        add(a, false);
-        add(b, true);
+        add(a);
+        add(b);
     }
 
-    ExactGap largest() {
+    ExactGap largest(bool depth) {
         Candidate candidate[15];
-        const int count = filtered(candidate);
+        int count = filtered(candidate);
         ExactGap best;
+        if (in_range_) {
+            count = filtered_wide(candidate, count);
+        }
         int chosen = -1;
         for (int k = 0; k < count; ++k) {
+            if (candidate[k].lower > 0.0) {
+                chosen = k;  // they are apart
+                break;
+            }
+            if (!depth && candidate[k].upper <= 0.0) {
+                chosen = chosen < 0 ? k : chosen;  // not along this one, and more is not asked
+                continue;
+            }
             ExactGap other;
             if (!measure(candidate[k], other)) {
                 continue;
@@ -72,27 +83,26 @@ public:
             }
         }
         best.found = chosen >= 0 && has_inside(candidate[chosen]);
+        best.meet = best.found && candidate[chosen].lower <= 0.0 && best.gap.upper <= 0.0;
         best.rung = rung_;
         return best;
     }
 
 private:
-    void add(const ExactAndRough& body, bool of_b) {
+    void add(const ExactAndRough& body) {
         for (int i = 0; i < body.exact.generators; ++i) {
             const double length = norm(body.rough.generator[i]);
             if (body.exact.half[i] == 0.0 || is_zero(body.exact.axis[i])) {
                 continue;
             }
             Generator& g = generator_[count_];
-            g = {&body.exact, i, of_b, body.rough.generator[i], length, count_};
+            g = {&body.exact, i, body.rough.generator[i], length, count_};
             for (int k = count_ - 1; k >= 0; --k) {
                 g.line = same_line(generator_[k].axis(), g.axis()) ? k : g.line;
             }
             ++count_;
         }
     }
-
-    static bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
     /// The pairs of lines that may span the facet with the largest gap.
     int filtered(Candidate* out) const {
@@ -130,10 +140,42 @@ private:
                 most = std::max(most, c.lower);
             }
         }
+        return keep(out, count, most);
+    }
+
+    /// The same in double-double, where more than one is left or the sign is open.
+    int filtered_wide(Candidate* c, int count) {
+        if (count == 1 && c->upper < 0.0) {
+            return count;
+        }
+        rung_ = std::max(rung_, Rung::wide);
+        double most = -kInfinity;
+        for (int k = 0; k < count; ++k) {
+            const Gap<Enclosed> gap = gap_along<Enclosed>(c[k]);
+            const Enclosed quotient = gap.numerator / root_of(gap.denominator);
+            const int sign = sign_of(gap.numerator);
+            if (!(quotient.error < kInfinity)) {
+                continue;
+            }
+            // Rounded outwards; of a number that is known to be zero nothing is left to round.
+            c[k].lower = sign == 0
+                             ? 0.0
+                             : next_down(quotient.value.hi -
+                                         (kUnitRoundoff * std::abs(quotient.value.hi) + quotient.error));
+            c[k].upper = sign == 0 ? 0.0
+                                   : next_up(quotient.value.hi +
+                                             (kUnitRoundoff * std::abs(quotient.value.hi) + quotient.error));
+            most = std::max(most, c[k].lower);
+        }
+        return keep(c, count, most);
+    }
+
+    /// Drops what is below `most`.
+    static int keep(Candidate* c, int count, double most) {
         int kept = 0;
         for (int k = 0; k < count; ++k) {
-            if (out[k].upper >= most) {
-                out[kept++] = out[k];
+            if (c[k].upper >= most) {
+                c[kept++] = c[k];
             }
         }
         return kept;
@@ -190,6 +232,10 @@ private:
 
     static bool round_signed(const Gap<Enclosed>& gap, Rounding& out) {
         const int sign = sign_of(gap.numerator);
+        if (sign == 0) {
+            out = {};
+            return true;
+        }
         if (sign == kUncertain || !round_root(gap.numerator * gap.numerator, gap.denominator, out)) {
             return false;
         }
@@ -226,8 +272,8 @@ private:
 
 }  // namespace
 
-ExactGap largest_facet_gap(const ExactAndRough& a, const ExactAndRough& b, bool in_range) {
-    return Axes(a, b, in_range).largest();
+ExactGap largest_facet_gap(const ExactAndRough& a, const ExactAndRough& b, bool in_range, bool depth) {
+    return Axes(a, b, in_range).largest(depth);
 }
 
 }  // namespace geomsrv

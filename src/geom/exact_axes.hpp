@@ -10,12 +10,13 @@ namespace geomsrv {
 
 struct ExactGap {
     bool found = false;  ///< false if the difference is flat; then nothing below has a meaning
-    Rounding gap;        ///< correctly rounded; if > 0 the bodies are apart, by at least this
-    Vec3 normal;         ///< unit, from a to b: the direction of that gap
+    bool meet = false;   ///< no facet parts them
+    Rounding gap;        ///< if they meet, and it was asked for: the largest of the gaps, correctly rounded
+    Vec3 normal;         ///< unit, from a to b: its direction
     Rung rung = Rung::filter;
 };
 
-/// REQUIRES: both are zonotopes.
-ExactGap largest_facet_gap(const ExactAndRough& a, const ExactAndRough& b, bool in_range);
+/// REQUIRES: both are zonotopes.  With `depth` the gap is measured, not only its sign.
+ExactGap largest_facet_gap(const ExactAndRough& a, const ExactAndRough& b, bool in_range, bool depth);
 
 }  // namespace geomsrv

@@ -10,10 +10,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "geom/enclosed.hpp"
 #include "geom/exact_number.hpp"
 #include "geom/frustum.hpp"
+#include "geom/lanes.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -40,17 +42,19 @@ VectorOf<N> operator*(const N& s, const VectorOf<N>& a) {
     return {s * a.x, s * a.y, s * a.z};
 }
 template <class N>
-N dot(const VectorOf<N>& a, const VectorOf<N>& b) {
+GEOMSRV_INLINE N dot(const VectorOf<N>& a, const VectorOf<N>& b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class N>
-VectorOf<N> cross(const VectorOf<N>& a, const VectorOf<N>& b) {
+GEOMSRV_INLINE VectorOf<N> cross(const VectorOf<N>& a, const VectorOf<N>& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class N>
 VectorOf<N> exactly(Vec3 a) {
     return {N(a.x), N(a.y), N(a.z)};
 }
+
+constexpr bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
 /// A convex polytope; pointers belong to the caller.
 struct ExactBody {
@@ -80,10 +84,22 @@ struct ExactBody {
     /// A point near the vertices, given literally: two bodies far from the origin are compared from there.
     [[nodiscard]] Vec3 anchor() const { return starts_at_apex() ? frustum->origin : center; }
 
+    /// A zonotope, or a hull of the listed points as they are.
+    [[nodiscard]] bool is_plain() const {
+        return kind == Kind::zonotope || (kind == Kind::hull && rotation == nullptr && is_zero(center));
+    }
+    /// Where the half edges of a vertex start; of a plain body only.
+    [[nodiscard]] Vec3 base_of(int vertex) const {
+        if (kind == Kind::zonotope) {
+            return center;
+        }
+        const double* p = points + 3 * static_cast<std::ptrdiff_t>(vertex);
+        return {p[0], p[1], p[2]};
+    }
+
     /// A frustum that is where its own numbers say.
     [[nodiscard]] bool starts_at_apex() const {
-        return kind == Kind::frustum && rotation == nullptr && center.x == 0.0 && center.y == 0.0 &&
-               center.z == 0.0;
+        return kind == Kind::frustum && rotation == nullptr && is_zero(center);
     }
 };
 
@@ -105,7 +121,10 @@ VectorOf<N> rotated(const Mat3* rotation, const VectorOf<N>& a) {
 /// Half an edge of a zonotope.
 template <class N>
 VectorOf<N> generator_of(const ExactBody& body, int i) {
-    return N(body.half[i]) * exactly<N>(body.axis[i]);
+    constexpr std::type_identity<N> kNumber;
+    const double h = body.half[i];
+    const Vec3 axis = body.axis[i];
+    return {product_of(h, axis.x, kNumber), product_of(h, axis.y, kNumber), product_of(h, axis.z, kNumber)};
 }
 
 /// A vertex minus the body's anchor, times its denominator.
@@ -151,13 +170,16 @@ template <class N>
 VectorOf<N> step_times_denominator(const ExactBody& body, int from, int to) {
     if (body.kind == ExactBody::Kind::zonotope) {
         VectorOf<N> step = exactly<N>({});
+        bool moved = false;
         for (int i = 0; i < body.generators; ++i) {
             if ((from >> i & 1) == (to >> i & 1)) {
                 continue;
             }
             const VectorOf<N> g = generator_of<N>(body, i);
-            const VectorOf<N> edge = {twice(g.x), twice(g.y), twice(g.z)};
-            step = (to >> i & 1) != 0 ? step + edge : step - edge;
+            const VectorOf<N> up = {twice(g.x), twice(g.y), twice(g.z)};
+            const VectorOf<N> edge = (to >> i & 1) != 0 ? up : -up;
+            step = moved ? step + edge : edge;
+            moved = true;
         }
         return step;
     }

@@ -35,8 +35,8 @@ public:
         const bool zonotopes =
             a_.exact.kind == ExactBody::Kind::zonotope && b_.exact.kind == ExactBody::Kind::zonotope;
         if (zonotopes && !want_.simplex && !surely_apart(found)) {
-            const ExactGap gap = largest_facet_gap(a_, b_, in_range_);
-            if (gap.found && gap.gap.upper <= 0.0) {
+            const ExactGap gap = largest_facet_gap(a_, b_, in_range_, want_.penetration);
+            if (gap.found && gap.meet) {
                 return deep(gap.gap, gap.normal, found.witness, gap.rung);
             }
         }
@@ -64,7 +64,7 @@ private:
             return deep({}, nan_vector(), simplex, rung);
         }
         if (a_.exact.kind == ExactBody::Kind::zonotope && b_.exact.kind == ExactBody::Kind::zonotope) {
-            const ExactGap gap = largest_facet_gap(a_, b_, in_range_);
+            const ExactGap gap = largest_facet_gap(a_, b_, in_range_, true);
             if (gap.found) {
                 return deep(gap.gap, gap.normal, simplex, std::max(rung, gap.rung));
             }
@@ -94,9 +94,10 @@ private:
     CoreSeparation with_points(const Witness& s) const {
         CoreSeparation out;
         out.witness = s;
+        const double unit = 1.0 / scale_;
         for (int i = 0; i < s.count; ++i) {
-            out.point_a = out.point_a + (s.weight[i] / scale_) * vertex_of(a_.rough, s.a[i]);
-            out.point_b = out.point_b + (s.weight[i] / scale_) * vertex_of(b_.rough, s.b[i]);
+            out.point_a = out.point_a + (unit * s.weight[i]) * vertex_of(a_.rough, s.a[i]);
+            out.point_b = out.point_b + (unit * s.weight[i]) * vertex_of(b_.rough, s.b[i]);
         }
         return out;
     }

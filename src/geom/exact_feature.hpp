@@ -6,8 +6,9 @@
 #pragma once
 
 #include <algorithm>
-#include <optional>
+#include <new>
 #include <type_traits>
+#include <utility>
 
 #include "geom/core.hpp"
 #include "geom/enclosed.hpp"
@@ -34,6 +35,8 @@ public:
     [[nodiscard]] double denominator_a() const { return a_.exact.denominator(); }
     [[nodiscard]] double denominator_b() const { return b_.exact.denominator(); }
     [[nodiscard]] bool in_range() const { return in_range_; }
+    /// Whether every vertex of K is a difference of two points that the caller gave, and some half edges.
+    [[nodiscard]] bool is_plain() const { return a_.exact.is_plain() && b_.exact.is_plain(); }
     [[nodiscard]] Rung rung() const { return rung_; }
     void climb(Rung to) { rung_ = std::max(rung_, to); }
 
@@ -100,6 +103,12 @@ private:
 template <class Pointer>
 using NumberOf = std::remove_pointer_t<Pointer>;
 
+/// From the first vertex of a feature of K to another; nothing if it has none.
+template <class N>
+VectorOf<N> step_to(const Difference& k, const Witness& s, int i) {
+    return i < s.count ? k.template step<N>(s.a[0], s.b[0], s.a[i], s.b[i]) : VectorOf<N>{};
+}
+
 /// One to three vertices of K, and v, the foot of the origin on the point, line or plane through them.
 template <class N>
 struct FeatureOf {
@@ -108,26 +117,31 @@ struct FeatureOf {
     VectorOf<N> e, f;     ///< from it to the others
     VectorOf<N> along;    ///< a multiple of v; negative where a face is seen from behind
     VectorOf<N> residue;  ///< zero iff v is; of a face only x is used
-    N divisor;            ///< |v|^2 = residue^2 / divisor
+    N square;             ///< of the residue
+    N divisor;            ///< |v|^2 = square / divisor
 
-    FeatureOf(const Difference& k, const Witness& s)
-        : count(s.count), w(k.template vertex<N>(s.a[0], s.b[0])) {
+    FeatureOf() {}  // NOLINT: a defaulted one would be zeroed byte by byte before it is filled
+    GEOMSRV_INLINE FeatureOf(int vertices, const VectorOf<N>& first, const VectorOf<N>& second,
+                             const VectorOf<N>& third)
+        : count(vertices), w(first), e(second), f(third) {
         if (count == 1) {
             along = residue = w;
+            square = dot(w, w);
             divisor = N(1.0);
-            return;
-        }
-        e = k.template step<N>(s.a[0], s.b[0], s.a[1], s.b[1]);
-        if (count == 2) {
+        } else if (count == 2) {
             residue = cross(w, e);
             along = cross(e, residue);
+            square = dot(residue, residue);
             divisor = dot(e, e);
-            return;
+        } else {
+            along = cross(e, f);
+            residue = {dot(along, w), N(), N()};
+            square = residue.x * residue.x;
+            divisor = dot(along, along);
         }
-        f = k.template step<N>(s.a[0], s.b[0], s.a[2], s.b[2]);
-        along = cross(e, f);
-        residue = {dot(along, w), N(), N()};
-        divisor = dot(along, along);
+    }
+    FeatureOf(const Difference& k, const Witness& s)
+        : FeatureOf(s.count, k.template vertex<N>(s.a[0], s.b[0]), step_to<N>(k, s, 1), step_to<N>(k, s, 2)) {
     }
 
     /// Barycentric coordinates of v, times `divisor`.
@@ -143,8 +157,43 @@ struct FeatureOf {
             out[0] = divisor - out[1] - out[2];
         }
     }
+};
 
-    [[nodiscard]] N numerator() const { return count == 3 ? residue.x * residue.x : dot(residue, residue); }
+/// In pair arithmetic.  REQUIRES: k.is_plain() and k.in_range().
+void evaluate_quickly(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out);
+
+/// A std::optional that is not zeroed as a whole before it is filled, as GCC does with large ones.
+template <class T>
+class Late {
+public:
+    Late() {}  // NOLINT: leaves the value alone
+    Late(const Late&) = delete;
+    Late& operator=(const Late&) = delete;
+    ~Late() { reset(); }
+
+    explicit operator bool() const { return set_; }
+    T& operator*() { return value_; }
+    T* operator->() { return &value_; }
+    template <class... Args>
+    T& emplace(Args&&... args) {
+        reset();
+        ::new (static_cast<void*>(&value_)) T(std::forward<Args>(args)...);
+        set_ = true;
+        return value_;
+    }
+
+private:
+    void reset() {
+        if (set_) {
+            value_.~T();
+            set_ = false;
+        }
+    }
+
+    bool set_ = false;
+    union {
+        T value_;
+    };
 };
 
 /// The same, in the arithmetic that each question needs.
@@ -187,10 +236,23 @@ public:
     }
 
 private:
+    /// Whether double-double arithmetic has the answer; the cheaper kind is asked first.
+    template <class Answers>
+    bool in_doubles(const Answers& answers) {
+        if (!k_.in_range()) {
+            return false;
+        }
+        if (!quick_ && k_.is_plain()) {
+            evaluate_quickly(k_, vertices_, quick_.emplace());
+        }
+        return (quick_ && answers(*quick_)) || answers(in<Enclosed>());
+    }
+
     Difference& k_;
     Witness vertices_;
-    std::optional<FeatureOf<Enclosed>> wide_;
-    std::optional<FeatureOf<Exact>> exact_;
+    Late<FeatureOf<Enclosed>> quick_;
+    Late<FeatureOf<Enclosed>> wide_;
+    Late<FeatureOf<Exact>> exact_;
 };
 
 /// a / b, rounded; a weight of a point.
@@ -239,17 +301,31 @@ constexpr bool same_line(Vec3 a, Vec3 b) {
     return (a.x == b.x && a.y == b.y && a.z == b.z) || (a.x == -b.x && a.y == -b.y && a.z == -b.z);
 }
 
+/// Whether two vertices of a difference of zonotopes differ by this edge of one body, and nothing else.
+inline bool is_edge_of(const Witness& s, bool of_b, int edge) {
+    for (int i = 0; i < s.count; ++i) {
+        for (int j = 0; j < i; ++j) {
+            if ((s.a[i] ^ s.a[j]) == (of_b ? 0 : edge) && (s.b[i] ^ s.b[j]) == (of_b ? edge : 0)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 // A vertex is lower than another along a unit direction by n . (difference); in doubles that is off by the
 // error of both vertices (2 kVertexError reach, 2 core.error), by the dot product (3 u of twice the reach)
 // and by the direction (6 u of twice the reach): 6 + 6 + 12 = 24, and something to spare.
 inline constexpr double kLevelError = 32 * kUnitRoundoff;
 
 /// A vertex of the body that is lower than `start` along a direction, the lowest as far as doubles can tell;
-/// -1 if there is none.  `n` is the direction in doubles (see Feature::direction), sign_along(step) the exact
-/// sign of its product with a step of the body.
+/// -1 if there is none.  The direction is perpendicular to the feature s of K; `start` is a vertex of s, `n`
+/// the direction in doubles (see Feature::direction), sign_along(step) the exact sign of its product with a
+/// step of the body.
 template <class SignAlong>
-int lower_vertex(const ExactAndRough& body, bool of_b, int start, Vec3 n, const Level& level,
-                 const SignAlong& sign_along) {
+int lower_vertex(const Difference& k, const Witness& s, bool of_b, Vec3 n, const SignAlong& sign_along) {
+    const ExactAndRough& body = of_b ? k.b() : k.a();
+    const int start = of_b ? s.b[0] : s.a[0];
     const Core& core = body.rough;
     const double doubt = kLevelError * core.reach + 2.0 * core.error;
     if (body.exact.kind == ExactBody::Kind::zonotope) {
@@ -261,13 +337,19 @@ int lower_vertex(const ExactAndRough& body, bool of_b, int start, Vec3 n, const 
             const double height = 2.0 * dot(n, core.generator[i]);
             if (std::abs(height) > doubt) {
                 lowest = height > 0.0 ? lowest & ~(1 << i) : lowest | 1 << i;
-            } else if (body.exact.half[i] != 0.0 && !level.has_axis(body.exact.axis[i])) {
+            } else if (body.exact.half[i] != 0.0) {
                 open[count++] = i;
             }
         }
+        if (lowest != start) {
+            return lowest;
+        }
         // What is level to rounding matters only where nothing else is lower.
-        for (int k = 0; k < count && lowest == start; ++k) {
-            const int flipped = start ^ 1 << open[k];
+        for (int j = 0; j < count && lowest == start; ++j) {
+            const int flipped = start ^ 1 << open[j];
+            if (is_edge_of(s, of_b, start ^ flipped) || Level(k, s).has_axis(body.exact.axis[open[j]])) {
+                continue;
+            }
             const int sign = sign_along([&](auto number) {
                 return step_times_denominator<decltype(number)>(body.exact, start, flipped);
             });
@@ -288,7 +370,7 @@ int lower_vertex(const ExactAndRough& body, bool of_b, int start, Vec3 n, const 
     }
     for (int i = 0; i < count && lowest < 0; ++i) {
         const double height = dot(n, vertex_of(core, i) - core.center) - base;
-        if (height > doubt || i == start || level.has(of_b, i)) {
+        if (height > doubt || i == start || Level(k, s).has(of_b, i)) {
             continue;
         }
         const int sign = sign_along(

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geom/exact_gjk.hpp"
 
-#include <optional>
 #include <stdexcept>
 
 namespace geomsrv {
@@ -31,7 +30,9 @@ public:
             if (simplex.count == 4 && holds_origin(simplex)) {
                 return met(simplex);
             }
-            Feature nearest = nearest_of(simplex);
+            Late<Feature> found;
+            find_nearest(simplex, found);
+            Feature& nearest = *found;
             const Witness& s = nearest.vertices();
             const int side = nearest.side();
             if (side == 0) {
@@ -39,11 +40,10 @@ public:
             }
             const Vec3 along = nearest.direction();
             const Vec3 n = side < 0 ? -along : along;
-            const Level level(k_, s);
             const auto up = [&](const auto& step_of) { return side * nearest.sign_along(step_of); };
             const auto down = [&](const auto& step_of) { return -side * nearest.sign_along(step_of); };
-            const int higher_a = lower_vertex(k_.a(), false, s.a[0], -n, level, down);
-            const int lower_b = lower_vertex(k_.b(), true, s.b[0], n, level, up);
+            const int higher_a = lower_vertex(k_, s, false, -n, down);
+            const int lower_b = lower_vertex(k_, s, true, n, up);
             if (higher_a < 0 && lower_b < 0) {
                 return {false, nearest.length(), n, s, k_.rung()};
             }
@@ -87,10 +87,10 @@ private:
 
     /// The vertex, edge or face of the simplex that holds its point nearest to the origin, strictly.
     /// REQUIRES: four vertices do not hold the origin strictly inside.
-    Feature nearest_of(const Witness& simplex) {
+    void find_nearest(const Witness& simplex, Late<Feature>& found) {
         // Larger features first: a float64 guess keeps only vertices with positive weights.
         for (int size = std::min(simplex.count, 3); size > 0; --size) {
-            for (int mask = 1; mask < 1 << simplex.count; ++mask) {
+            for (int mask = (1 << simplex.count) - 1; mask > 0; --mask) {
                 int at[4];
                 int count = 0;
                 for (int i = 0; i < simplex.count; ++i) {
@@ -101,9 +101,9 @@ private:
                 if (count != size) {
                     continue;
                 }
-                Feature feature(k_, chosen(simplex, at, count));
-                if (feature.holds_foot() && nothing_below(feature, simplex, mask)) {
-                    return feature;
+                found.emplace(k_, chosen(simplex, at, count));
+                if (found->holds_foot() && nothing_below(*found, simplex, mask)) {
+                    return;
                 }
             }
         }

@@ -184,7 +184,6 @@ private:
     template <class Along>
     bool goes_both_ways(const Witness& s, ExactDepth& out, const Along& along, Witness& longer) {
         const Vec3 n = direction(along);
-        const Level level(k_, s);
         for (const int way : {-1, 1}) {
             const auto in_a = [&](const auto& step_of) {
                 return -way * k_.sign([&](auto* sum) {
@@ -194,8 +193,8 @@ private:
             };
             const auto in_b = [&](const auto& step_of) { return -in_a(step_of); };
             const Vec3 downwards = way * n;
-            const int a = lower_vertex(k_.a(), false, s.a[0], -downwards, level, in_a);
-            const int b = lower_vertex(k_.b(), true, s.b[0], downwards, level, in_b);
+            const int a = lower_vertex(k_, s, false, -downwards, in_a);
+            const int b = lower_vertex(k_, s, true, downwards, in_b);
             if (a < 0 && b < 0) {
                 out.normal = downwards;
                 return false;
@@ -282,11 +281,10 @@ private:
     bool beyond(Feature& feature, HullVertex& next) {
         const Witness& s = feature.vertices();
         const Vec3 n = feature.direction();
-        const Level level(k_, s);
         const auto up = [&](const auto& step_of) { return feature.sign_along(step_of); };
         const auto down = [&](const auto& step_of) { return -feature.sign_along(step_of); };
-        const int a = lower_vertex(k_.a(), false, s.a[0], n, level, up);
-        const int b = lower_vertex(k_.b(), true, s.b[0], -n, level, down);
+        const int a = lower_vertex(k_, s, false, n, up);
+        const int b = lower_vertex(k_, s, true, -n, down);
         if (a < 0 && b < 0) {
             return false;
         }

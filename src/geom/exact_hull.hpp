@@ -16,7 +16,7 @@ struct ExactDepth {
     Rounding depth;  ///< correctly rounded; 0 if the origin is on the boundary of K, or K is flat
     Vec3 normal;     ///< unit, from a to b: moving b by depth * normal parts the bodies
     Witness foot;    ///< vertices of K whose plane is the nearest facet, and the weights of the origin's foot
-                   ///< on it; count 0 if that lies beside them, or the depth is 0
+                     ///< on it; count 0 if that lies beside them, or the depth is 0
     Rung rung = Rung::wide;
 };
 

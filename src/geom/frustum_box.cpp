@@ -103,12 +103,12 @@ constexpr int kMinSlopeExponent = -1000;
 // Entries of edges below this are set to zero, and tolerances are at least kFloor in each coordinate.  That
 // covers the change (4 entries of at most kNegligible) and all underflow: edges that are not zero are >=
 // 2^-300, entries of a cross product that are not zero are >= 2^-600 2^-104 (both factors have 53 bits),
-// times kFloor
-// >= 2^-994, while an underflow loses 2^-1075.  Of floats: 2^-32, 2^-64 2^-46 (24 bits), 2^-139, 2^-150.
+// times kFloor >= 2^-994, while an underflow loses 2^-1075.  Of floats: 2^-32, 2^-64 2^-46 (24 bits), 2^-137,
+// 2^-150.
 template <class Real>
 constexpr Real kNegligible = kIsDouble<Real> ? Real(0x1p-300) : Real(0x1p-32);
 template <class Real>
-constexpr Real kFloor = kIsDouble<Real> ? Real(0x1p-290) : Real(0x1p-29);
+constexpr Real kFloor = kIsDouble<Real> ? Real(0x1p-290) : Real(0x1p-27);
 
 // On the way to those units, where lengths are about 1 but the map is not, about 20 products and entries may
 // underflow, each losing at most half the smallest number.  What they lose is mapped, scaled and added to
@@ -136,10 +136,9 @@ constexpr Real kLost = Real(0x1p14) * std::numeric_limits<Real>::denorm_min();
 //
 // - Some gap > bound: the given bodies are disjoint, for M separates them.
 // - All gaps <= -bound: let K be the set of differences of points of the rounded frustum and box.  The axes
-// hold
-//   all facet normals of K, for flat boxes too, so K contains the brick Q = +-13 u (Z + W).  The differences
-//   of the given ones are within Q of K; were they disjoint, then along the direction that separates them K
-//   would not contain Q.
+//   hold all facet normals of K, for flat boxes too, so K contains the brick Q = +-13 u (Z + W).  The
+//   differences of the given ones are within Q of K; were they disjoint, then along the direction that
+//   separates them K would not contain Q.
 template <class Real>
 constexpr Real kCullError = 32 * kRoundoff<Real>;
 
@@ -154,9 +153,8 @@ constexpr double kEdgeError = 16 * kRoundoff<double>;
 template <class Real>
 struct LocalScene {
     Vector<Real> center;
-    Vector<Real>
-        edge[3];  ///< A_i, scaled to about 1; without extents, so that flat boxes keep their directions
-    PowerOfTwo edge_unit[3];  ///< the scale
+    Vector<Real> edge[3];     ///< A_i times edge_unit; without extents, so that flat boxes keep directions
+    PowerOfTwo edge_unit[3];  ///< what makes them about 1
     Real half[3];             ///< extents in units of these edges
     Vector<Real> bound;       ///< Z above
     Vector<Real> floor;       ///< least tolerance

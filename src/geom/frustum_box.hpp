@@ -89,11 +89,19 @@ inline constexpr Real kMinSquaredRadius = std::is_same_v<Real, double> ? Real(0x
 //     inside      all s < -r
 //     intersects  all s < 0 and some s > -r, each by more than the error:  centre inside, some corner outside
 
-/// As many boxes as lanes against all planes; x, y, z is the centre from the apex.  A sphere needs no axes,
-/// which are most of a box; it can tell `outside` (0) and `inside` (2), else the answer is kUndecided.
+/// What the spheres around as many boxes as lanes tell.
 template <class L>
-GEOMSRV_INLINE L classify_by_sphere(const CullPlanes<L>& planes, const std::array<L, 3>& center,
-                                    const std::array<L, 3>& half) {
+struct SphereVerdict {
+    L state;  ///< outside (0) or inside (2), else kUndecided
+    L plane;  ///< that an outside sphere lies beyond, else kCount
+};
+
+/// As many boxes as lanes against all planes; x, y, z is the centre from the apex.  A sphere needs no axes,
+/// which are most of a box.
+template <class L>
+GEOMSRV_INLINE SphereVerdict<L> classify_by_sphere(const CullPlanes<L>& planes,
+                                                   const std::array<L, 3>& center,
+                                                   const std::array<L, 3>& half) {
     using Real = typename L::Real;
     const auto& [x, y, z] = center;
     const L radius =
@@ -102,13 +110,18 @@ GEOMSRV_INLINE L classify_by_sphere(const CullPlanes<L>& planes, const std::arra
     const L reach = (magnitude(x) + magnitude(y) + magnitude(z)) + Real(4.0) * radius;
     const auto in_range = reach < L(kMaxReach<Real>);
     auto within = in_range, beyond = ~in_range;
-    for (const PlaneLanes<L>& plane : planes.each) {
+    const L none = Real(planes.kCount);
+    L which = none;
+    for (int number = 0; number < planes.kCount; ++number) {
+        const PlaneLanes<L>& plane = planes.each[number];
         const L s = (plane.x * x + plane.y * y + plane.z * z) - plane.offset;
         const L r = radius * plane.length + (plane.error_per_length * reach + plane.error);
         beyond = beyond | (r < s);
         within = within & (s < -r);
+        which = select(r < s, L(Real(number)), which);
     }
-    return select(beyond & in_range, L(Real(0)), select(within, L(Real(2)), L(Real(kUndecided))));
+    return {select(beyond & in_range, L(Real(0)), select(within, L(Real(2)), L(Real(kUndecided)))),
+            select(in_range, which, none)};
 }
 
 /// A box seen from the apex, in the unit and the precision of the planes.

@@ -1,7 +1,7 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-// Products and sums of lanes, with a fused multiply-add where there is one: for kernels whose error bounds hold
-// either way, and whose answers are so proven that they are the same bits.
+// Products and sums of lanes, with a fused multiply-add where there is one: for kernels whose error bounds
+// hold either way, and whose answers are so proven that they are the same bits.
 #pragma once
 
 #include "geom/lanes.hpp"
@@ -30,8 +30,8 @@ struct TwoRoundings {
 #if !defined(GEOMSRV_ONE_PATH) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"  // the value never leaves the function it melts into
-/// The same with one rounding, for kernels whose error bounds hold for both.  Only inside of a function marked
-/// GEOMSRV_FUSED; where the processor `has_fused`.
+/// The same with one rounding, for kernels whose error bounds hold for both.  Only inside of a function
+/// marked GEOMSRV_FUSED; where the processor `has_fused`.
 struct OneRounding {
     GEOMSRV_INLINE static Lanes multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) {
         return Lanes(Lanes::Vector(__builtin_ia32_vfmaddpd256(a.v, b.v, c.v)));

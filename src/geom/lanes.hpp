@@ -13,7 +13,8 @@
 
 // One binary serves every x86-64: a batch loop is compiled twice and the loader picks the wider one where the
 // processor has it.  Both give the same bits, because contraction is off and a fused multiply-add is only
-// where std::fma says so.  GEOMSRV_ONE_PATH compiles it once, for the target, which is how tests compare the two.
+// where std::fma says so.  GEOMSRV_ONE_PATH compiles it once, for the target, which is how tests compare the
+// two.
 #if !defined(GEOMSRV_ONE_PATH) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define GEOMSRV_WIDE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3")))
 #else

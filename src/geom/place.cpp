@@ -41,8 +41,6 @@ Rounded rounded(WideVec3 v, double size) {
     return {narrow(v), safe_norm({v.x.lo, v.y.lo, v.z.lo}) + 8 * kWideRoundoff * size};
 }
 
-bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
-
 /// scale * (R m + t - origin): far from the origin these cancel, so the sum is formed in double-double.
 Rounded relative_wide(Vec3 m, const Transform& X_ls, const LocalFrame& frame, bool turned) {
     const Vec3 t = frame.scale * X_ls.translation;
@@ -256,6 +254,48 @@ Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFram
     core.reach = (safe_norm(core.center) + spread) * kRoundedUp;
     core.error = middle.error + kUnitRoundoff * spread;
     return core;
+}
+
+RoundedCorners rounded_corners(const Frustum& f, bool from_apex) {
+    // In double-double a ray of three products, times the ratio of the planes, is off by 2^-97 of its size at
+    // most; the sum with the apex by as much of both; then each coordinate is rounded once, by u.
+    constexpr double kRounding = 2 * kUnitRoundoff;
+    constexpr double kBeforeRounding = 0x1p-90;
+    constexpr double kUnderflow = 4 * std::numeric_limits<double>::denorm_min();
+    const double window = std::max({std::abs(f.l0), std::abs(f.l1), std::abs(f.u0), std::abs(f.u1), f.near});
+    const double scale = scale_for(window);
+    const int up_near = std::ilogb(f.near);
+    const int up_far = std::ilogb(f.far);
+    const DoubleDouble ratio =
+        DoubleDouble{std::ldexp(f.far, -up_far), 0.0} / DoubleDouble{std::ldexp(f.near, -up_near), 0.0};
+    const Vec3 from = from_apex ? Vec3{} : f.origin;
+    RoundedCorners out;
+    double largest = 0.0;
+    double longest = 0.0;
+    for (int i = 0; i < 8; ++i) {
+        const DoubleDouble left{scale * ((i & 1) != 0 ? f.l1 : f.l0), 0.0};
+        const DoubleDouble up{scale * ((i & 2) != 0 ? f.u1 : f.u0), 0.0};
+        const DoubleDouble near{scale * f.near, 0.0};
+        WideVec3 ray =
+            left * widen(f.axes.row[0]) + up * widen(f.axes.row[1]) + near * widen(f.axes.row[2]);
+        const int exponent = (i & 4) != 0 ? up_far - up_near : 0;
+        if ((i & 4) != 0) {
+            ray = ratio * ray;
+        }
+        const auto placed = [&](DoubleDouble x, double start) {
+            const double hi = std::ldexp(x.hi / scale, exponent);
+            const DoubleDouble sum = two_sum(start, hi);
+            longest = std::max(longest, std::abs(hi));
+            return sum.hi + (sum.lo + std::ldexp(x.lo / scale, exponent));
+        };
+        const Vec3 v = {placed(ray.x, from.x), placed(ray.y, from.y), placed(ray.z, from.z)};
+        out.vertices[3 * i] = v.x;
+        out.vertices[3 * i + 1] = v.y;
+        out.vertices[3 * i + 2] = v.z;
+        largest = std::max(largest, safe_norm(v));
+    }
+    out.error = kRounding * largest + kBeforeRounding * (longest + largest_of(from)) + kUnderflow;
+    return out;
 }
 
 ExactBody exact_body(const ShapeView& shape, const Transform& X_ls) {

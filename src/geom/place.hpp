@@ -42,6 +42,14 @@ Core place_box(Vec3 center, const Mat3& axes, Vec3 half_extents, const LocalFram
 /// The shape by its own numbers; `X_ls` must outlive it.  Not for half spaces.
 ExactBody exact_body(const ShapeView& shape, const Transform& X_ls);
 
+/// The corners of a frustum in the order of ExactBody, relative to its apex or to the origin of its axes, and
+/// how far each may be off.
+struct RoundedCorners {
+    double vertices[24];
+    double error = 0.0;
+};
+RoundedCorners rounded_corners(const Frustum& frustum, bool from_apex);
+
 /// Largest coordinate by size.
 double largest_of(Vec3 v);
 

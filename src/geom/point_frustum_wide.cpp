@@ -47,9 +47,9 @@ WideFrame<Sides> wide_frame(const View<Sides>& view, const DistanceFrame<Lanes, 
     const double margin = kWideMargin + frame.relative_error[0];
     wide.margin = margin * steep;
     // Y is off by less than m times the margin in the depth and in the coordinates of inactive sides, and by
-    // |slope| times that in the others: q P with P the power of two in the reach m < 2 P.  Where the error e P
-    // passes Ziv's test, d > 2^53 e P, so what is lost to second order, (q P)^2 / 2 d, is at most
-    // 2^-54 q^2 P / e.  That and the first order together are e P for this e:
+    // |slope| times that in the others: q P with P the power of two in the reach m < 2 P.  Where the error e
+    // P passes Ziv's test, d > 2^53 e P, so what is lost to second order, (q P)^2 / 2 d, is at most 2^-54 q^2
+    // P / e.  That and the first order together are e P for this e:
     const double q = 2.0 * margin * steep;
     const double half = 0.5 * kWideError;
     wide.error = (half + std::sqrt(half * half + 0x1p-54 * (q * q))) / kRounder;

@@ -3,9 +3,10 @@
 // Distance of points from a frustum's literal hull, correctly rounded, four at a time: the region by a
 // float64 filter, then the distance to 2^-72 of the scene's size.
 //
-// Where the nearest point Y sits on its feature matters only to second order: a point of the same feature that
-// is off by e is farther from x by e^2 / 2 d.  So y, the coordinates of Y by the closed form in doubles, does,
-// taken as if it were exact; an active side has the coordinate k t, with its exact slope k.  What is left is
+// Where the nearest point Y sits on its feature matters only to second order: a point of the same feature
+// that is off by e is farther from x by e^2 / 2 d.  So y, the coordinates of Y by the closed form in doubles,
+// does, taken as if it were exact; an active side has the coordinate k t, with its exact slope k.  What is
+// left is
 //
 //     d = |r|,    r = x - E - sum of y_i a_i        by the literal axes a_i,
 //
@@ -72,8 +73,8 @@ GEOMSRV_INLINE Halves<Lanes> halves(const Lanes& rounder, const Lanes& x) {
 }
 
 // Errors of what decides the region, in units u of roundoff of the reach m = max(|c_0| + |c_1| + |c_2|,
-// window); c are the coordinates of x, p = x - E.  |p| is at most 1.005 m, an axis being no longer than 1.005;
-// so is |Y - E|, since E and the frustum span a convex set; hence d is at most 2.01 m.
+// window); c are the coordinates of x, p = x - E.  |p| is at most 1.005 m, an axis being no longer
+// than 1.005; so is |Y - E|, since E and the frustum span a convex set; hence d is at most 2.01 m.
 //
 // 1. Coordinates: 13 u sum |dual| |p| each (9 dual basis, 1 difference, 1 product, 2 sums): 13.3 u m, as a
 //    vector 23 u m.
@@ -90,8 +91,8 @@ inline constexpr double kWideMargin = 96.0 * kUnitRoundoff;
 
 // Error of d to first order, in units of 2^-78 P, P <= m < 2 P.
 //
-// 1. A component of r.  Rests are at most 2^-25 P, and sums of them 3.7 times that; a rounding is 2^-53 of its
-//    result.  Rest of p 1; six products with a rest 2.7, their sums 15.9; y's rests themselves 1.8, and y
+// 1. A component of r.  Rests are at most 2^-25 P, and sums of them 3.7 times that; a rounding is 2^-53 of
+//    its result.  Rest of p 1; six products with a rest 2.7, their sums 15.9; y's rests themselves 1.8, and y
 //    where it multiplies the axes' rests 0.9: 22.3, as a vector 38.7.
 // 2. The remainder of the square, halved by 2 d.  b, the rest of r, is at most 4.7 * 2^-25 P in each
 //    component, 8.2 as a vector; its own rounding 8.2.  The sum of b (2 a + b): 12.3 for 2 a + b, 8.2 for the
@@ -232,8 +233,8 @@ GEOMSRV_INLINE WideDistance<Sides> length(const WideFrame<Sides>& wide, const Re
     const LaneMask inside = Lanes::load(r.region + first) <= none, outside = ~inside;
     const LaneMask::Vector below = beyond.v < 0.0;  // -1 if so
     const Lanes lower = neighbour(nearest, below), upper = neighbour(lower, LaneMask::Vector{1, 1, 1, 1});
-    return {kept(outside, nearest), kept(outside, lower), kept(outside, upper),
-            inside, load_mask(r.proven + first) & (inside | (one_rounding & one_side))};
+    return {kept(outside, nearest), kept(outside, lower), kept(outside, upper), inside,
+            load_mask(r.proven + first) & (inside | (one_rounding & one_side))};
 }
 
 }  // namespace geomsrv

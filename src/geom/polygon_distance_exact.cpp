@@ -37,7 +37,6 @@ struct Widest {
 /// Leaves for every axis an upper bound of gap/|D| in work[0], and of the gap in work[1].
 GEOMSRV_WIDE_CLONES Widest widths_of(const PolygonPair& pair) {
     const Lanes zero = 0.0;
-    const double gap_error = kFilterError * pair.gap_error();
     Lanes widest = -kInfinity;
     LaneMask overlap = zero <= zero;
     for (const int i : {0, 1}) {
@@ -46,7 +45,8 @@ GEOMSRV_WIDE_CLONES Widest widths_of(const PolygonPair& pair) {
             const Lanes dx = Lanes::load(p.dx + k);
             const Lanes dy = Lanes::load(p.dy + k);
             const Lanes gap = Lanes::load(p.gap + k);
-            const Lanes error = Lanes(gap_error) * (magnitude(dx) + magnitude(dy)) + Lanes(kPairUnderflow);
+            const Lanes error =
+                Lanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + Lanes(kPairUnderflow);
             const Lanes length = square_root(dx * dx + dy * dy);
             const LaneMask is_long = Lanes(kShortestAxis) < length;
             const Lanes least = (gap - error) / length;
@@ -70,13 +70,13 @@ struct Over {
     std::size_t other_vertex = 0;  ///< and of the other polygon
 };
 
-Over over_edge(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
+Over over_edge(const PolygonPair& pair, AxisOf axis, Level lowest) {
     const PairedPolygon& p = pair.side(axis.side);
     const Ring q = pair.other(axis.side).ring;
     const std::size_t end = p.next(axis.index);
     const Vec2 from = p.ring[axis.index];
     const Vec2 to = p.ring[end];
-    Over over{vertex, level_neighbour(pair, axis, vertex)};
+    Over over{lowest.vertex, lowest.neighbour};
     if (over.low != over.high && sign_of_dot(from, to, q[over.low], q[over.high]) < 0) {
         std::swap(over.low, over.high);
     }
@@ -113,10 +113,10 @@ Nearest nearest_of(const PolygonPair& pair, double least_width) {
                 continue;
             }
             const AxisOf axis{side, k};
-            const std::size_t vertex = pair.lowest(axis);
-            const bool is_edge = k < p.edges;
+            const Level lowest = pair.lowest_level(axis);
+            const std::size_t vertex = lowest.vertex;
             const Over over =
-                is_edge ? over_edge(pair, axis, vertex) : Over{vertex, vertex, true, p.base(k), vertex};
+                k < p.edges ? over_edge(pair, axis, lowest) : Over{vertex, vertex, true, p.base(k), vertex};
             const bool proven = over.beside
                                     ? is_nearest_vertex(p, over.own_vertex, q.ring[over.other_vertex]) &&
                                           is_nearest_vertex(q, over.other_vertex, p.ring[over.own_vertex])
@@ -206,7 +206,7 @@ bool apart(const PolygonPair& pair, const Nearest& nearest, PolygonDistance& out
 template <class A>
 struct Width {
     AxisOf axis;
-    std::size_t vertex = 0;
+    Level lowest;
     typename A::Number gap, squared_length;
 };
 
@@ -223,8 +223,8 @@ bool deepest(const PolygonPair& pair, double least_width, PolygonDistance& out) 
             }
             const AxisOf axis{side, k};
             const typename A::Vector normal = normal_of<A>(pair, axis);
-            Width<A> width{axis, pair.lowest(axis), {}, dot(normal, normal)};
-            width.gap = dot(normal, across<A>(pair, axis, width.vertex));
+            Width<A> width{axis, pair.lowest_level(axis), {}, dot(normal, normal)};
+            width.gap = dot(normal, across<A>(pair, axis, width.lowest.vertex));
             int wider = 1;
             if (found) {
                 // Both are negative.
@@ -248,7 +248,7 @@ bool deepest(const PolygonPair& pair, double least_width, PolygonDistance& out) 
         return false;
     }
     set_distance(out, depth);
-    return face<A>(pair, best.axis, over_edge(pair, best.axis, best.vertex), out);
+    return face<A>(pair, best.axis, over_edge(pair, best.axis, best.lowest), out);
 }
 
 }  // namespace
@@ -277,9 +277,9 @@ PolygonDistance ExactPolygonDistanceSolver::solve(Ring a, Ring b, bool penetrati
             for (const AxisOf other : touching_) {
                 axis = is_before(pair_, other, axis) ? other : axis;
             }
-            const std::size_t vertex = lowest_along(pair_, axis);
+            const Level lowest = lowest_along(pair_, axis);
             const bool is_edge = axis.index < pair_.side(axis.side).edges;
-            const Over over = is_edge ? over_edge(pair_, axis, vertex) : Over{vertex, vertex};
+            const Over over = is_edge ? over_edge(pair_, axis, lowest) : Over{lowest.vertex, lowest.vertex};
             out.rung = climb(in_range, [&](auto arithmetic) {
                 return face<decltype(arithmetic)>(pair_, axis, over, out);
             });

@@ -21,9 +21,9 @@ bool is_safe_double(const Enclosed& x) { return x.value.lo == 0.0 && x.error == 
 // What `quotient` rounds, in units of u^2 of it, u = 2^-53: its first part is off by 2 u, so the rest is no
 // larger than 5 u.  That is found by three sums and a product (4 + 2 + 4 + 1) and multiplied by a number that
 // is off by u (10).  Rounded up.
-constexpr double kQuotientError = 32.0 * kUnitRoundoff * kUnitRoundoff;
+constexpr double kInverseError = 32.0 * kUnitRoundoff * kUnitRoundoff;
 
-/// a / b, given 1 / b.hi rounded.
+/// a / b by one division, which several may share: inverse = 1 / b.hi.
 DoubleDouble quotient(DoubleDouble a, DoubleDouble b, double inverse) {
     const double first = a.hi * inverse;
     const DoubleDouble product = two_product(first, b.hi);
@@ -31,18 +31,19 @@ DoubleDouble quotient(DoubleDouble a, DoubleDouble b, double inverse) {
     return quick_two_sum(first, rest * inverse);
 }
 
-/// The same with a bound; faster than that for any numbers.
+/// a / b.
 Enclosed ratio(const Enclosed& a, const Enclosed& b) {
+    constexpr double kSmallRelative = 0x1p-20;
     const double size = std::fabs(b.value.hi);
-    if (!is_safe(a.value.hi) || !is_safe(size) || !(b.error < 0.5 * size)) {
+    if (!is_safe(a.value.hi) || !is_safe(size) || !(b.error < kSmallRelative * size)) {
         return a / b;
     }
     const double inverse = 1.0 / b.value.hi;
     const DoubleDouble value = quotient(a.value, b.value, inverse);
     // |a/b - q| <= (|da| + |q| |db|) / (|b| - |db|), and the rounding of the quotient.
     const double size_q = std::fabs(value.hi);
-    const double inherited = (a.error + size_q * b.error) / (size * (1.0 - 4.0 * kUnitRoundoff) - b.error);
-    return {value, (inherited + kQuotientError * size_q) * kBoundRounding};
+    const double inherited = (a.error + size_q * b.error) * std::fabs(inverse) * (1.0 + 2.0 * kSmallRelative);
+    return {value, (inherited + kInverseError * size_q) * kBoundRounding};
 }
 
 /// The quotient of two doubles: division rounds it correctly, the sign of the rest tells to which side.
@@ -118,6 +119,7 @@ Vec2 Wide::direction(const Vector& v) {
     const DoubleDouble square = dot(v, v).value;
     const double root = std::sqrt(square.hi);
     const double inverse = 1.0 / root;
+    // One Newton step (Karp), as in `sqrt`.
     const DoubleDouble rest = two_product(root, root);
     const DoubleDouble length{root, 0.5 * inverse * (((square.hi - rest.hi) - rest.lo) + square.lo)};
     return {quotient(v.x, length, inverse).hi, quotient(v.y, length, inverse).hi};
@@ -179,31 +181,20 @@ AxisEnds ends_of(const PolygonPair& pair, AxisOf axis) {
     return {turned(p.ring[p.next(tip)]), turned(p.ring[tip])};
 }
 
-std::size_t lowest_along(const PolygonPair& pair, AxisOf axis) {
+Level lowest_along(const PolygonPair& pair, AxisOf axis) {
     if (axis.index < pair.side(axis.side).edges) {
-        return pair.lowest(axis);
+        return pair.lowest_level(axis);
     }
     const Ring q = pair.other(axis.side).ring;
     const AxisEnds ends = ends_of(pair, axis);
-    return q.size() > 1 && sign_of_cross(ends.from, ends.to, q[0], q[1]) > 0 ? 1 : 0;
+    const std::size_t lowest = q.size() > 1 && sign_of_cross(ends.from, ends.to, q[0], q[1]) > 0 ? 1 : 0;
+    return {lowest, lowest};
 }
 
 int sign_of_gap(const PolygonPair& pair, AxisOf axis, std::size_t lowest) {
     const PairedPolygon& p = pair.side(axis.side);
     const AxisEnds ends = ends_of(pair, axis);
     return -sign_of_cross(ends.from, ends.to, p.ring[p.base(axis.index)], pair.other(axis.side).ring[lowest]);
-}
-
-std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
-    const PairedPolygon& q = pair.other(axis.side);
-    const AxisEnds edge = ends_of(pair, axis);
-    for (const std::size_t neighbour : {q.next(vertex), q.previous(vertex)}) {
-        if (neighbour != vertex &&
-            sign_of_cross(edge.from, edge.to, q.ring[vertex], q.ring[neighbour]) == 0) {
-            return neighbour;
-        }
-    }
-    return vertex;
 }
 
 Relation relation_of(const PolygonPair& pair, bool flat, std::size_t most, std::vector<AxisOf>& touching) {
@@ -215,7 +206,7 @@ Relation relation_of(const PolygonPair& pair, bool flat, std::size_t most, std::
                 continue;
             }
             const AxisOf axis{side, k};
-            const int sign = sign_of_gap(pair, axis, lowest_along(pair, axis));
+            const int sign = sign_of_gap(pair, axis, lowest_along(pair, axis).vertex);
             if (sign > 0) {
                 return Relation::apart;
             }

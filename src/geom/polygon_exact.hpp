@@ -22,10 +22,6 @@
 
 namespace geomsrv {
 
-// The bounds of polygon_pair.hpp hold for what is computed; another three units of 2 |D|_1 reach each cover
-// the second-order terms and the rounding of what is compared with them.
-inline constexpr double kFilterError = 1.25;
-
 /// dot(a, b), without error where it is found without rest, as on a grid.
 inline Enclosed dot(const ExactVec2& a, const ExactVec2& b) {
     const DoubleDouble x = a.x * b.x;
@@ -36,7 +32,7 @@ inline Enclosed dot(const ExactVec2& a, const ExactVec2& b) {
     const bool zero_y = a.y.hi == 0.0 || b.y.hi == 0.0;
     // Both products fit in a double, and so large a double that nothing was lost below it.
     const auto is_whole = [](DoubleDouble p, DoubleDouble q, DoubleDouble product) {
-        return p.lo == 0.0 && q.lo == 0.0 && product.lo == 0.0 && std::fabs(product.hi) > kWholeProduct;
+        return p.lo == 0.0 && q.lo == 0.0 && product.lo == 0.0 && std::fabs(product.hi) > kNoUnderflow;
     };
     if ((zero_x || is_whole(a.x, b.x, x)) && (zero_y || is_whole(a.y, b.y, y))) {
         return {value, 0.0};
@@ -124,12 +120,8 @@ bool is_flat(const PolygonPair& pair);
 inline std::size_t axes_of(const PairedPolygon& p, bool flat) { return flat ? p.axes : p.edges; }
 
 /// The vertex of the other polygon that is lowest along one of those axes, and the sign of the gap: exactly.
-std::size_t lowest_along(const PolygonPair& pair, AxisOf axis);
+Level lowest_along(const PolygonPair& pair, AxisOf axis);
 int sign_of_gap(const PolygonPair& pair, AxisOf axis, std::size_t lowest);
-
-/// The vertex of the other polygon beside `vertex` that is exactly as low along the axis of an edge, or
-/// `vertex` itself if there is none.
-std::size_t level_neighbour(const PolygonPair& pair, AxisOf axis, std::size_t vertex);
 
 /// How two polygons lie.
 enum class Relation { apart, touching, overlapping };

@@ -14,14 +14,13 @@
 //
 // Exact contact is the one case that float64 data hardly ever represent: of two polygons that touch, rotated
 // copies overlap or miss by a rounding error.  Therefore every yes/no question below - apart, approaching,
-// parallel, same place - has a slack for the rounding of the *input*, see `Slacks`, and counts as contact
-// where the slack cannot exclude it. The time and its bounds do not depend on it: they come from the given
-// numbers taken literally, at twice the precision.
+// parallel, same place - has a slack for the rounding of the *input*, see `Slacks` in polygon_window.hpp, and
+// counts as contact where the slack cannot exclude it. The time and its bounds do not depend on it: they come
+// from the given numbers taken literally, at twice the precision.
 #include "geom/polygon_first_contact.hpp"
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -29,6 +28,7 @@
 #include "geom/double_double.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/lanes.hpp"
+#include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
 namespace geomsrv {
@@ -40,120 +40,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// Rounding of the input, as a multiple of half an ulp of the largest coordinate: rotating and shifting a
-// polygon moves a vertex by less than 7 (see kRingTolerance in polygon.hpp), rounded up.
-constexpr double kInputNoise = 8.0 * kUnitRoundoff;
-
-// Likewise for velocities, which are only rotated: 3.42 * 1.42 < 5 half ulps of the larger component.
-constexpr double kVelocityNoise = 5.0 * kUnitRoundoff;
-
-// No slack exceeds this part of the reach (or of the speed).  So separations, angles and overlaps that are
-// larger are always told apart, however far from the origin and however short the edges: with tips a gap is
-// at least half the distance, and 2^-42 + rounding stays below half of 2^-40 of the scene.
-constexpr double kLargestSlack = 0x1p-42;
-
-// Velocities are rescaled where they leave [2^-200, 2^200], so that products with edges stay in the range of
-// double.
-constexpr double kSmallestSpeed = 0x1p-200;
-constexpr double kLargestSpeed = 0x1p200;
-
-// Error of a rate D.w relative to |Dx wx| + |Dy wy|: edge, velocity, product, sum; the rest covers the bound.
-constexpr double kRateError = 5.0 * kUnitRoundoff;
-
-/// Motion of b relative to a, in units of its own.
-struct Motion {
-    Vec2 velocity;    ///< times 2^scale_exponent
-    ExactVec2 exact;  ///< the same, unrounded
-    int scale_exponent = 0;
-    double noise = 0.0;  ///< what rounding of the given velocities may change
-
-    /// A given velocity in these units.
-    [[nodiscard]] Vec2 scaled(Vec2 v) const {
-        return {std::scalbn(v.x, scale_exponent), std::scalbn(v.y, scale_exponent)};
-    }
-};
-
-Motion relative_motion(Vec2 velocity_a, Vec2 velocity_b) {
-    const auto largest = [](Vec2 v) { return std::max(std::fabs(v.x), std::fabs(v.y)); };
-    double before = 1.0;
-    double scale = 1.0;
-    int exponent = 0;
-    double speed = largest(velocity_b - velocity_a);
-    if (!(speed <= kLargestSpeed) || (speed < kSmallestSpeed && speed > 0.0)) {
-        // Components of opposite signs may differ by more than the largest double.
-        if (std::isinf(speed)) {
-            before = 0.25;
-        }
-        speed = largest(before * velocity_b - before * velocity_a);
-        exponent = std::clamp(-std::ilogb(speed), -1000, 1000);
-        scale = std::scalbn(1.0, exponent);
-        exponent += std::ilogb(before);
-    }
-    const auto apart = [=](double to, double from) -> DoubleDouble {
-        const DoubleDouble difference = two_sum(before * to, -(before * from));
-        return {scale * difference.hi, scale * difference.lo};
-    };
-    const ExactVec2 exact = {apart(velocity_b.x, velocity_a.x), apart(velocity_b.y, velocity_a.y)};
-    const double noise =
-        kVelocityNoise * (scale * (before * largest(velocity_a) + before * largest(velocity_b)));
-    return {{exact.x.hi, exact.y.hi}, exact, exponent, noise};
-}
-
-/// How far gaps and rates of an axis D may be off.
-///
-/// Rounding here: see kGapError and kRateError.  Rounding of the input moves every vertex by up to `noise`,
-/// so a gap by 2 noise |D|; and it turns an edge by up to 2 noise / |D|, which moves what is a reach away by
-/// 2 noise reach / |D|, times |D|.  A rate changes by the velocity's noise and by the same turn.  All cut at
-/// kLargestSlack.
-struct Slacks {
-    double gap_rounding;  ///< per |D|_1
-    double gap_noise;     ///< per |D|_1 + reach
-    double gap_limit;     ///< per |D|_1
-    double reach;
-    double rate_noise;  ///< per |D|_1
-    double turn_noise;
-    double rate_limit;      ///< per |D|_1
-    double rate_underflow;  ///< products with a velocity of zero are exact: at rest nothing approaches
-
-    Slacks(const PolygonPair& pair, const Motion& motion)
-        : gap_rounding(pair.gap_error()),
-          gap_noise(2.0 * kInputNoise * pair.magnitude()),
-          gap_limit(kLargestSlack * pair.reach()),
-          reach(pair.reach()),
-          rate_noise(motion.noise),
-          turn_noise(gap_noise * (std::fabs(motion.velocity.x) + std::fabs(motion.velocity.y))),
-          rate_limit(kLargestSlack * std::max(std::fabs(motion.velocity.x), std::fabs(motion.velocity.y))),
-          rate_underflow(rate_limit > 0.0 ? kPairUnderflow : 0.0) {}
-
-    [[nodiscard]] Slack heights() const { return {gap_noise, gap_limit}; }
-};
-
-/// Gap and rate of one axis (Real = double) or of several (Lanes), and how far off they may be.
-template <class Real>
-struct AxisNumbers {
-    Real gap, rate, gap_slack, rate_slack;
-};
-
-/// `approach` is -1 for axes of a, +1 for axes of b.
-template <class Real>
-GEOMSRV_INLINE AxisNumbers<Real> numbers(const Real& dx, const Real& dy, const Real& gap, double approach,
-                                         const Motion& motion, const Slacks& slacks) {
-    const Real along_x = dx * Real(approach * motion.velocity.x);
-    const Real along_y = dy * Real(approach * motion.velocity.y);
-    const Real size = magnitude(dx) + magnitude(dy);
-    const Real gap_noise =
-        lesser<Real>(slacks.gap_noise * (size + Real(slacks.reach)), slacks.gap_limit * size);
-    const Real rate_noise =
-        lesser<Real>(slacks.rate_noise * size + Real(slacks.turn_noise), slacks.rate_limit * size);
-    // Axes of no length fill up blocks of lanes: subnormal rates there would slow down the whole block.
-    const Real none = 0.0;
-    const Real rate_underflow = select(none < size, Real(slacks.rate_underflow), none);
-    return {gap, along_x + along_y, slacks.gap_rounding * size + gap_noise + Real(kPairUnderflow),
-            Real(kRateError) * (magnitude(along_x) + magnitude(along_y)) + rate_noise + rate_underflow};
-}
-
-constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
-
 AxisNumbers<double> numbers(const PolygonPair& pair, AxisOf axis, const Motion& motion,
                             const Slacks& slacks) {
     const PairedPolygon& p = pair.side(axis.side);
@@ -161,89 +47,8 @@ AxisNumbers<double> numbers(const PolygonPair& pair, AxisOf axis, const Motion& 
     return numbers<double>(p.dx[k], p.dy[k], p.gap[k], approach_of(axis.side), motion, slacks);
 }
 
-/// What all axes together say, slacks included.
-struct Window {
-    double enter;  ///< contact cannot begin earlier
-    double leave;  ///< nor last longer
-    bool apart;    ///< certainly apart along some axis now
-    bool never;    ///< ... and certainly not approaching along it
-    bool deep;     ///< certainly overlapping along every axis now
-};
-
-/// Leaves for every axis in work[0..2]: the largest gap and the least rate, whose quotient is the latest
-/// entry or the earliest exit, and the largest rate.
-GEOMSRV_WIDE_CLONES Window window_of(const PolygonPair& pair, const Motion& motion, const Slacks& slacks) {
-    const Lanes zero = 0.0;
-    const Lanes never = kInfinity;
-    const LaneMask none = never < zero;
-    Lanes enter = zero;
-    Lanes leave = never;
-    LaneMask apart = none;
-    LaneMask parting = none;
-    LaneMask deep = ~none;
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const AxisNumbers<Lanes> at = numbers(Lanes::load(p.dx + k), Lanes::load(p.dy + k),
-                                                  Lanes::load(p.gap + k), approach_of(i), motion, slacks);
-            const Lanes open = at.gap - at.gap_slack;       // > 0: certainly apart
-            const Lanes closing = at.rate + at.rate_slack;  // <= 0: certainly not approaching
-            const Lanes most = at.gap + at.gap_slack;
-            const Lanes time = open / closing;
-            const LaneMask is_apart = zero < open;
-            const LaneMask may_close = zero < closing;
-            apart = apart | is_apart;
-            parting = parting | (is_apart & ~may_close);
-            deep = deep & (most < zero);
-            enter = greater(enter, select(is_apart & may_close, time, zero));
-            leave = lesser(leave, select(closing < zero, time, never));
-            most.store(p.work[0] + k);
-            (at.rate - at.rate_slack).store(p.work[1] + k);
-            closing.store(p.work[2] + k);
-        }
-    }
-    return {greatest(enter), least(leave), any(apart), any(parting), all(deep)};
-}
-
-// Candidates are kept as bits, 64 axes at a time: to branch on every block costs more than all of its
-// arithmetic, as nobody can predict which block holds one.
-struct CandidateBits {
-    std::uint64_t entries = 0;
-    std::uint64_t exits = 0;
-};
-
-/// Lane i of a block of axes as bit 4 block + i.
-GEOMSRV_INLINE LaneMask bits_of_block(const LaneMask& set, std::size_t block) {
-    static_assert(kLanes == 4);
-    const LaneMask::Vector bits{1, 2, 4, 8};
-    return set & LaneMask(bits << static_cast<std::int64_t>(kLanes * block));
-}
-
-GEOMSRV_INLINE std::uint64_t joined(const LaneMask& bits) {
-    return static_cast<std::uint64_t>((bits.v[0] | bits.v[1]) | (bits.v[2] | bits.v[3]));
-}
-
-GEOMSRV_WIDE_CLONES CandidateBits candidate_bits(const PairedPolygon& p, std::size_t first, std::size_t end,
-                                                 const Window& window) {
-    const Lanes zero = 0.0;
-    LaneMask entries = zero < zero;
-    LaneMask exits = entries;
-    for (std::size_t k = first, block = 0; k < end; k += kLanes, ++block) {
-        const Lanes most = Lanes::load(p.work[0] + k);
-        const Lanes slowest = Lanes::load(p.work[1] + k);
-        const Lanes closing = Lanes::load(p.work[2] + k);
-        // most / slowest >= enter if it approaches for certain; else it may begin at any time.
-        const LaneMask begins = (zero < most) & (Lanes(window.enter) * slowest <= most);
-        // most / slowest <= leave, both negative.  Sliding within the slack does not end a contact.
-        const LaneMask ends = (closing < zero) & (Lanes(window.leave) * slowest <= most);
-        entries = entries | bits_of_block(begins, block);
-        exits = exits | bits_of_block(ends, block);
-    }
-    return {joined(entries), joined(exits)};
-}
-
-/// Whether the polygons as given are certainly in contact at that time: no axis can be open then.  (Slacks for
-/// rounding of the input, which are not needed here, are more than what this comparison rounds.)
+/// Whether the polygons as given are certainly in contact at that time: no axis can be open then.  (Slacks
+/// for rounding of the input, which are not needed here, are more than what this comparison rounds.)
 GEOMSRV_WIDE_CLONES bool are_in_contact(const PolygonPair& pair, double time) {
     LaneMask closed = Lanes(0.0) <= Lanes(0.0);
     for (const int i : {0, 1}) {
@@ -253,35 +58,6 @@ GEOMSRV_WIDE_CLONES bool are_in_contact(const PolygonPair& pair, double time) {
         }
     }
     return all(closed);
-}
-
-/// How many axes `candidates_of` has listed.
-struct Candidates {
-    std::size_t entries = 0;
-    std::size_t exits = 0;
-};
-
-/// Axes that may set the first or the last contact, found without a division per axis: those along which
-/// contact may begin no earlier than `window.enter`, and those along which it may end no later than
-/// `window.leave`, which are the outermost bounds.  Mostly it is one axis each.
-Candidates candidates_of(const PolygonPair& pair, const Window& window, AxisOf* entries, AxisOf* exits) {
-    constexpr std::size_t kRow = 64;
-    Candidates found;
-    const auto list = [](std::uint64_t bits, int side, std::size_t first, AxisOf* axes, std::size_t count) {
-        for (; bits != 0; bits &= bits - 1) {
-            axes[count++] = {side, first + static_cast<std::size_t>(std::countr_zero(bits))};
-        }
-        return count;
-    };
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        for (std::size_t first = 0; first < p.axes; first += kRow) {
-            const CandidateBits bits = candidate_bits(p, first, std::min(first + kRow, p.axes), window);
-            found.entries = list(bits.entries, i, first, entries, found.entries);
-            found.exits = list(bits.exits, i, first, exits, found.exits);
-        }
-    }
-    return found;
 }
 
 /// A time and proven bounds.
@@ -586,10 +362,10 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     result.time_upper =
         std::max(std::min(seconds.up(std::min(entry.upper, window.leave)), t_max), result.time);
     result.last_time = std::max(std::min(seconds.nearest(exit), t_max), result.time);
-    result.certain = window.apart
-                         ? are_in_contact(pair_, std::min(0.5 * (moment + exit),
-                                                          next_down(seconds.inverse(t_max))))
-                         : window.deep;
+    result.certain =
+        window.apart
+            ? are_in_contact(pair_, std::min(0.5 * (moment + exit), next_down(seconds.inverse(t_max))))
+            : window.deep;
     result.normal = {kNaN, kNaN};
     if (result.status != ContactStatus::overlapping) {
         if (result.status == ContactStatus::touching) {

@@ -9,177 +9,55 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "geom/exact_sign.hpp"
-#include "geom/lanes.hpp"
+#include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
 namespace geomsrv {
 
 namespace {
 
-constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-// Velocities are rescaled where they leave [2^-200, 2^200], so that products with edges stay in the range of
-// double.
-constexpr double kSmallestSpeed = 0x1p-200;
-constexpr double kLargestSpeed = 0x1p200;
-
-// Error of a rate D.w relative to |Dx wx| + |Dy wy|: edge, velocity, product, sum; then the rounding of what
-// is compared with it, and the rest covers the bound.
-constexpr double kRateError = 6.0 * kUnitRoundoff;
-
-constexpr double approach_of(int side) { return side == 0 ? -1.0 : 1.0; }
-
-double largest(Vec2 v) { return std::max(std::fabs(v.x), std::fabs(v.y)); }
-
-/// Motion of b relative to a.
-struct Motion {
-    Vec2 velocity_a, velocity_b;  ///< as given
-    Vec2 velocity;                ///< relative, rounded, times 2^scale_exponent
-    int scale_exponent = 0;
-
-    Motion(Vec2 va, Vec2 vb) : velocity_a(va), velocity_b(vb), velocity(vb - va) {
-        const double speed = largest(velocity);
-        if (speed <= kLargestSpeed && (speed >= kSmallestSpeed || speed == 0.0)) {
-            return;
-        }
-        // Components of opposite signs may differ by more than the largest double.
-        const double before = std::isinf(speed) ? 0.25 : 1.0;
-        const Vec2 apart = before * vb - before * va;
-        const int exponent = std::clamp(-std::ilogb(largest(apart)), -1000, 1000);
-        velocity = std::scalbn(1.0, exponent) * apart;
-        scale_exponent = exponent + std::ilogb(before);
-    }
-
-    [[nodiscard]] Vec2 velocity_of(int side) const { return side == 0 ? velocity_a : velocity_b; }
-};
-
-/// What all axes together say, up to rounding.
-struct Window {
-    double enter = 0.0;    ///< contact cannot begin earlier
-    double leave = 0.0;    ///< nor last longer
-    bool apart = false;    ///< certainly apart along some axis now
-    bool parting = false;  ///< ... and not approaching along it
-    bool deep = false;     ///< certainly overlapping along every axis now
-};
-
-/// Leaves for every axis in work[0..2]: the largest gap and the least rate, whose quotient is the latest
-/// entry or the earliest exit, and the largest rate.
-GEOMSRV_WIDE_CLONES Window window_of(const PolygonPair& pair, const Motion& motion) {
-    const Lanes zero = 0.0;
-    const Lanes never = kInfinity;
-    const LaneMask none = never < zero;
-    const double gap_error = kFilterError * pair.gap_error();
-    // Products with a velocity of zero are exact: at rest nothing approaches.
-    const double underflow = largest(motion.velocity) > 0.0 ? kPairUnderflow : 0.0;
-    Lanes enter = zero;
-    Lanes leave = never;
-    LaneMask apart = none;
-    LaneMask parting = none;
-    LaneMask deep = ~none;
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        const Lanes way_x = approach_of(i) * motion.velocity.x;
-        const Lanes way_y = approach_of(i) * motion.velocity.y;
-        for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const Lanes dx = Lanes::load(p.dx + k);
-            const Lanes dy = Lanes::load(p.dy + k);
-            const Lanes gap = Lanes::load(p.gap + k);
-            const Lanes along_x = dx * way_x;
-            const Lanes along_y = dy * way_y;
-            const Lanes rate = along_x + along_y;
-            const Lanes gap_off = Lanes(gap_error) * (magnitude(dx) + magnitude(dy)) + Lanes(kPairUnderflow);
-            const Lanes rate_off =
-                Lanes(kRateError) * (magnitude(along_x) + magnitude(along_y)) + Lanes(underflow);
-            const Lanes open = gap - gap_off;       // > 0: certainly apart
-            const Lanes closing = rate + rate_off;  // <= 0: certainly not approaching
-            const Lanes most = gap + gap_off;
-            const Lanes time = open / closing;
-            const LaneMask is_apart = zero < open;
-            const LaneMask may_close = zero < closing;
-            apart = apart | is_apart;
-            parting = parting | (is_apart & ~may_close);
-            deep = deep & (most < zero);
-            enter = greater(enter, select(is_apart & may_close, time, zero));
-            leave = lesser(leave, select(closing < zero, time, never));
-            most.store(p.work[0] + k);
-            (rate - rate_off).store(p.work[1] + k);
-            closing.store(p.work[2] + k);
-        }
-    }
-    return {std::max(0.0, next_down(greatest(enter))), next_up(least(leave)), any(apart), any(parting),
-            all(deep)};
-}
-
-struct Candidates {
-    std::size_t entries = 0;
-    std::size_t exits = 0;
-};
-
-/// Axes that may set the first or the last contact: those along which contact may begin no earlier than
-/// `window.enter`, and those along which it may end no later than `window.leave`.
-GEOMSRV_WIDE_CLONES Candidates candidates_of(const PolygonPair& pair, const Window& window, bool flat,
-                                             AxisOf* entries, AxisOf* exits) {
-    Candidates found;
-    const Lanes zero = 0.0;
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        const std::size_t count = axes_of(p, flat);
-        for (std::size_t k = 0; k < count; k += kLanes) {
-            const Lanes most = Lanes::load(p.work[0] + k);
-            const Lanes slowest = Lanes::load(p.work[1] + k);
-            // most / slowest >= enter if it approaches for certain; else it may begin at any time.
-            const LaneMask begins = (zero < most) & (Lanes(window.enter) * slowest <= most);
-            // most / slowest <= leave, both negative.
-            const LaneMask ends = (slowest < zero) & (Lanes(window.leave) * slowest <= most);
-            if (!any(begins | ends)) {
-                continue;
-            }
-            for (std::size_t lane = 0; lane < kLanes && k + lane < count; ++lane) {
-                if (begins.v[lane] != 0) {
-                    entries[found.entries++] = {i, k + lane};
-                }
-                if (ends.v[lane] != 0) {
-                    exits[found.exits++] = {i, k + lane};
-                }
-            }
-        }
-    }
-    return found;
-}
 
 /// What is known before exact numbers are asked for.
 struct Query {
     const PolygonPair& pair;
-    const Motion& motion;
+    Vec2 velocity_a, velocity_b;
+    bool flat;
     double t_max;
     bool contact_set;
     Relation relation;
     std::span<const AxisOf> touching;  ///< axes along which polygons touch at the start
     std::span<const AxisOf> entries;   ///< axes that may set the first contact
     std::span<const AxisOf> exits;     ///< and the last
+
+    [[nodiscard]] bool bounds(AxisOf axis) const { return axis.index < axes_of(pair.side(axis.side), flat); }
+    /// Velocity of the polygon with an axis towards the other one, as seen from there.
+    template <class A>
+    [[nodiscard]] typename A::Vector approach(int side) const {
+        return side == 0 ? A::difference(velocity_a, velocity_b) : A::difference(velocity_b, velocity_a);
+    }
 };
 
 /// A gap and the rate at which it closes: it is zero at their quotient.
 template <class A>
 struct Clip {
     AxisOf axis;
-    std::size_t vertex = 0;  ///< of the other polygon, lowest along the axis
+    Level lowest;  ///< of the other polygon
     typename A::Vector normal;
     typename A::Number gap, rate;
 };
 
 template <class A>
-Clip<A> clip_along(const Query& query, AxisOf axis) {
-    Clip<A> clip{axis, lowest_along(query.pair, axis), normal_of<A>(query.pair, axis), {}, {}};
-    clip.gap = dot(clip.normal, across<A>(query.pair, axis, clip.vertex));
-    const Motion& motion = query.motion;
-    clip.rate = dot(clip.normal, axis.side == 0 ? A::difference(motion.velocity_a, motion.velocity_b)
-                                                : A::difference(motion.velocity_b, motion.velocity_a));
-    return clip;
+void clip_along(const Query& query, AxisOf axis, Clip<A>& clip) {
+    clip.axis = axis;
+    clip.lowest = lowest_along(query.pair, axis);
+    clip.normal = normal_of<A>(query.pair, axis);
+    clip.gap = dot(clip.normal, across<A>(query.pair, axis, clip.lowest.vertex));
+    clip.rate = dot(clip.normal, query.approach<A>(axis.side));
 }
 
 /// +1 if the gap of p closes later than that of q; both rates have the same sign.
@@ -288,7 +166,11 @@ private:
     bool find_entry() {
         bool found = false;
         for (const AxisOf axis : query_.entries) {
-            Clip<A> clip = clip_along<A>(query_, axis);
+            if (!query_.bounds(axis)) {
+                continue;
+            }
+            Clip<A>& clip = found ? other_ : entry_;
+            clip_along(query_, axis, clip);
             const int open = sign_of(clip.gap);
             const int closing = sign_of(clip.rate);
             if (open == kUncertain || (open > 0 && closing == kUncertain)) {
@@ -301,7 +183,11 @@ private:
                 never_ = true;
                 return true;
             }
-            int later = found ? compare_times(clip, entry_) : 1;
+            if (!found) {
+                found = true;
+                continue;
+            }
+            int later = compare_times(clip, entry_);
             if (later == 0) {
                 later = is_preferred(query_.pair, clip, entry_);
             }
@@ -309,9 +195,8 @@ private:
                 return false;
             }
             if (later > 0) {
-                entry_ = std::move(clip);
+                std::swap(clip, entry_);
             }
-            found = true;
         }
         // Along the edges contact has begun where the tip of a needle says that it has not: they miss.
         never_ = !found;
@@ -321,7 +206,11 @@ private:
     /// The axis that opens first.
     bool find_exit() {
         for (const AxisOf axis : query_.exits) {
-            Clip<A> clip = clip_along<A>(query_, axis);
+            if (!query_.bounds(axis)) {
+                continue;
+            }
+            Clip<A>& clip = leaves_ ? other_ : exit_;
+            clip_along(query_, axis, clip);
             const int closing = sign_of(clip.rate);
             if (closing == kUncertain) {
                 return false;
@@ -329,14 +218,17 @@ private:
             if (closing >= 0) {
                 continue;
             }
-            const int earlier = leaves_ ? compare_times(exit_, clip) : 1;
+            if (!leaves_) {
+                leaves_ = true;
+                continue;
+            }
+            const int earlier = compare_times(exit_, clip);
             if (earlier == kUncertain) {
                 return false;
             }
             if (earlier > 0) {
-                exit_ = std::move(clip);
+                std::swap(clip, exit_);
             }
-            leaves_ = true;
         }
         if (!leaves_) {
             // At rest, or along the edges contact lasts longer than at the tip of a needle: they miss.
@@ -352,15 +244,19 @@ private:
     bool find_touching() {
         bool found = false;
         for (const AxisOf axis : query_.touching) {
-            Clip<A> clip = clip_along<A>(query_, axis);
-            const int preferred = found ? is_preferred(query_.pair, clip, entry_) : 1;
+            Clip<A>& clip = found ? other_ : entry_;
+            clip_along(query_, axis, clip);
+            if (!found) {
+                found = true;
+                continue;
+            }
+            const int preferred = is_preferred(query_.pair, clip, entry_);
             if (preferred == kUncertain) {
                 return false;
             }
             if (preferred > 0) {
-                entry_ = std::move(clip);
+                std::swap(clip, entry_);
             }
-            found = true;
         }
         entry_.gap = Number(0.0);
         entry_.rate = Number(1.0);
@@ -370,7 +266,7 @@ private:
     /// A vertex, moved.
     bool place(int side, std::size_t vertex, Vec2& out) const {
         const Vec2 from = query_.pair.side(side).ring[vertex];
-        const Vec2 velocity = query_.motion.velocity_of(side);
+        const Vec2 velocity = side == 0 ? query_.velocity_a : query_.velocity_b;
         if (query_.relation == Relation::touching || (velocity.x == 0.0 && velocity.y == 0.0)) {
             out = from;
             return true;
@@ -392,8 +288,7 @@ private:
         if (axis.index >= p.edges) {
             return place(axis.side, p.base(axis.index), points_[0]);
         }
-        std::size_t q_low = entry_.vertex;
-        std::size_t q_high = level_neighbour(pair, axis, q_low);
+        auto [q_low, q_high] = entry_.lowest;
         if (q_low == q_high) {
             return place(other, q_low, points_[0]);
         }
@@ -406,11 +301,7 @@ private:
         }
 
         const typename A::Vector along{-entry_.normal.y, entry_.normal.x};
-        const Motion& motion = query_.motion;
-        const Number drift =
-            dot(along, axis.side == 0 ? A::difference(motion.velocity_b, motion.velocity_a)
-                                      : A::difference(motion.velocity_a, motion.velocity_b)) *
-            entry_.gap;
+        const Number drift = dot(along, query_.approach<A>(other)) * entry_.gap;
         // Whether a vertex of the other polygon is further along than one of this, by then.
         const auto order = [&](std::size_t q, std::size_t p_vertex) {
             return sign_of(dot(along, A::difference(ring_q[q], ring_p[p_vertex])) * entry_.rate + drift);
@@ -445,6 +336,7 @@ private:
     bool leaves_ = false;
     Clip<A> entry_;
     Clip<A> exit_;
+    Clip<A> other_;  // to compare with one of them
 };
 
 }  // namespace
@@ -458,9 +350,12 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
                                             bool contact_set) {
     constexpr FirstContact kNever{ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN}, {}, true};
     pair_.load(a.ring, b.ring);
-    const Motion motion(a.velocity, b.velocity);
-    const Window window = window_of(pair_, motion);
-    if (window.parting || window.enter > window.leave) {
+    const Motion motion = relative_motion(a.velocity, b.velocity);
+    Window window = window_of(pair_, motion, Slacks(pair_, motion).literal());
+    // The bounds hold, their quotients are rounded.
+    window.enter = std::max(0.0, next_down(window.enter));
+    window.leave = next_up(window.leave);
+    if (window.never || window.enter > window.leave) {
         return kNever;
     }
     const int exponent = motion.scale_exponent - pair_.scale_exponent();
@@ -469,12 +364,12 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
     }
 
     const bool flat = is_flat(pair_);
-    Query query{pair_, motion, t_max, contact_set, Relation::apart, {}, {}, {}};
+    Query query{pair_, a.velocity, b.velocity, flat, t_max, contact_set, Relation::apart, {}, {}, {}};
     if (!window.apart) {
         query.relation = window.deep ? Relation::overlapping : relation_of(pair_, flat, 0, touching_);
         query.touching = touching_;
     }
-    const Candidates candidates = candidates_of(pair_, window, flat, entries_.data(), exits_.data());
+    const Candidates candidates = candidates_of(pair_, window, entries_.data(), exits_.data());
     query.entries = {entries_.data(), candidates.entries};
     query.exits = {exits_.data(), candidates.exits};
 

@@ -16,24 +16,33 @@ namespace geomsrv {
 
 namespace {
 
+constexpr std::size_t kLanes = Lanes::kCount;
+
 constexpr bool same(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
 
 /// A segment has one edge here, not two.
 std::size_t lines_of(const PairedPolygon& p) { return p.edges == 2 ? 1 : p.edges; }
 
-/// Sides of all vertices of p beyond one edge of q; whether some are not certain, which are left at 0.
-GEOMSRV_WIDE_CLONES bool find_sides_of(const PairedPolygon& p, const PairedPolygon& q, std::size_t edge,
-                                       double error, std::int8_t* to) {
-    const double dx = q.dx[edge];
-    const double dy = q.dy[edge];
-    const double own = q.own(edge);
-    bool doubt = false;
-    for (std::size_t i = 0; i < p.ring.size(); ++i) {
-        const double height = (dx * p.x[i] + dy * p.y[i]) - own;
-        to[i] = static_cast<std::int8_t>((height > error) - (height < -error));
-        doubt = doubt || to[i] == 0;
+/// For every edge of q, whether the vertices of p are beyond it (1) or behind (-1); 0 where that is not
+/// certain, which is reported.
+GEOMSRV_WIDE_CLONES bool certain_sides(const PairedPolygon& p, const PairedPolygon& q, double gap_error,
+                                       std::size_t stride, double* to) {
+    const Lanes zero = 0.0;
+    LaneMask certain = zero <= zero;
+    for (std::size_t k = 0; k < q.edges; ++k, to += stride) {
+        const Lanes dx = q.dx[k];
+        const Lanes dy = q.dy[k];
+        const Lanes own = q.own(k);
+        const Lanes error = gap_error * (std::fabs(q.dx[k]) + std::fabs(q.dy[k])) + kPairUnderflow;
+        for (std::size_t i = 0; i < p.ring.size(); i += kLanes) {
+            const Lanes height = (dx * Lanes::load(p.x + i) + dy * Lanes::load(p.y + i)) - own;
+            const LaneMask beyond = error < height;
+            const LaneMask behind = height < -error;
+            certain = certain & (beyond | behind);
+            select(beyond, Lanes(1.0), select(behind, Lanes(-1.0), zero)).store(to + i);
+        }
     }
-    return doubt;
+    return all(certain);
 }
 
 }  // namespace
@@ -42,17 +51,17 @@ GEOMSRV_WIDE_CLONES bool find_sides_of(const PairedPolygon& p, const PairedPolyg
 void ExactPolygonOverlap::find_sides(const PolygonPair& pair, int side) {
     const PairedPolygon& p = pair.side(side);
     const PairedPolygon& q = pair.other(side);
-    const std::size_t count = p.ring.size();
-    sides_[side].resize(count * q.edges);
+    Sides& sides = sides_[static_cast<std::size_t>(side)];
+    sides.stride = (p.ring.size() + kLanes - 1) / kLanes * kLanes;
+    sides.of.resize(sides.stride * q.edges);
+    if (certain_sides(p, q, pair.gap_error(), sides.stride, sides.of.data())) {
+        return;
+    }
     for (std::size_t k = 0; k < q.edges; ++k) {
-        std::int8_t* const to = sides_[side].data() + k * count;
-        const double size = std::fabs(q.dx[k]) + std::fabs(q.dy[k]);
-        if (!find_sides_of(p, q, k, kFilterError * pair.gap_error() * size + kPairUnderflow, to)) {
-            continue;
-        }
-        for (std::size_t i = 0; i < count; ++i) {
-            if (to[i] == 0) {
-                to[i] = static_cast<std::int8_t>(-orientation(q.ring[k], q.ring[q.next(k)], p.ring[i]));
+        for (std::size_t i = 0; i < p.ring.size(); ++i) {
+            double& sign = sides.of[k * sides.stride + i];
+            if (sign == 0.0) {
+                sign = -orientation(q.ring[k], q.ring[q.next(k)], p.ring[i]);
             }
         }
     }
@@ -65,7 +74,7 @@ bool ExactPolygonOverlap::is_inside(const PolygonPair& pair, int side, std::size
         return same(v, q.ring[0]);
     }
     for (std::size_t k = 0; k < q.edges; ++k) {
-        if (side_of(pair, side, vertex, k) > 0) {
+        if (side_of(side, vertex, k) > 0) {
             return false;
         }
     }
@@ -90,7 +99,7 @@ void ExactPolygonOverlap::add_vertices(const PolygonPair& pair, int side) {
             // On the boundary of both, the one that turns further to the left is the boundary of the
             // intersection.
             const Vec2 end = q.ring[q.next(k)];
-            if (side_of(pair, side, i, k) == 0 && !same(v, end) &&
+            if (side_of(side, i, k) == 0 && !same(v, end) &&
                 (p.edges == 0 || sign_of_cross(v, p.ring[p.next(i)], q.ring[k], end) > 0)) {
                 corner.side = 1 - side;
                 corner.edge = k;
@@ -106,9 +115,9 @@ void ExactPolygonOverlap::add_crossings(const PolygonPair& pair, bool in_range, 
     for (std::size_t i = 0; i < lines_of(a); ++i) {
         const std::size_t i_end = a.next(i);
         for (std::size_t k = 0; k < lines_of(b); ++k) {
-            const int start_side = side_of(pair, 0, i, k);
-            const bool crosses = start_side * side_of(pair, 0, i_end, k) < 0 &&
-                                 side_of(pair, 1, k, i) * side_of(pair, 1, b.next(k), i) < 0;
+            const double start_side = side_of(0, i, k);
+            const bool crosses =
+                start_side * side_of(0, i_end, k) < 0 && side_of(1, k, i) * side_of(1, b.next(k), i) < 0;
             if (!crosses) {
                 continue;
             }

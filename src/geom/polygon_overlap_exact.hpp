@@ -3,8 +3,8 @@
 // Intersection of two convex polygons at rest, exactly as the given numbers have it.
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -33,16 +33,22 @@ private:
         std::size_t edge;
     };
 
+    struct Sides {
+        std::vector<double> of;  ///< all vertices of a polygon, for each edge of the other
+        std::size_t stride = 0;
+    };
+
     void find_sides(const PolygonPair& pair, int side);
-    /// On which side of an edge of the other polygon a vertex is: beyond it (+1), on its line, behind.
-    [[nodiscard]] int side_of(const PolygonPair& pair, int side, std::size_t vertex, std::size_t edge) const {
-        return sides_[side][edge * pair.side(side).ring.size() + vertex];
+    /// Whether a vertex is beyond (1) an edge of the other polygon, on its line (0) or behind (-1).
+    [[nodiscard]] double side_of(int side, std::size_t vertex, std::size_t edge) const {
+        return sides_[static_cast<std::size_t>(side)]
+            .of[edge * sides_[static_cast<std::size_t>(side)].stride + vertex];
     }
     [[nodiscard]] bool is_inside(const PolygonPair& pair, int side, std::size_t vertex) const;
     void add_vertices(const PolygonPair& pair, int side);
     void add_crossings(const PolygonPair& pair, bool in_range, Rung& rung);
 
-    std::vector<std::int8_t> sides_[2];
+    std::array<Sides, 2> sides_;
     std::vector<Corner> corners_;
     std::vector<Vec2> points_;
 };

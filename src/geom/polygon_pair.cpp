@@ -205,16 +205,24 @@ GEOMSRV_WIDE_CLONES void project_all_of_both(const PairedPolygon& a, const Paire
     project_all(b, a);
 }
 
-std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
-    std::size_t best = 0;
-    double low = kInfinity;
-    for (std::size_t j = 0; j < q.ring.size(); ++j) {
-        const double height = dot(axis, q.local(j));
-        // Without a branch: which vertex is lowest cannot be predicted.
-        best = height < low ? j : best;
-        low = lesser(height, low);
+/// One of the vertices that are lowest, up to rounding.  Without branches: which is lowest cannot be
+/// predicted.
+GEOMSRV_WIDE_CLONES std::size_t lowest_vertex(const PairedPolygon& q, Vec2 axis) {
+    const Lanes step = static_cast<double>(kLanes);
+    const Lanes count = static_cast<double>(q.ring.size());
+    Lanes place(Lanes::Vector{0.0, 1.0, 2.0, 3.0});
+    Lanes low = kInfinity;
+    Lanes best = 0.0;
+    for (std::size_t j = 0; j < q.ring.size(); j += kLanes) {
+        const Lanes height = Lanes(axis.x) * Lanes::load(q.x + j) + Lanes(axis.y) * Lanes::load(q.y + j);
+        const LaneMask lower = (place < count) & (height < low);
+        low = select(lower, height, low);
+        best = select(lower, place, best);
+        place = place + step;
     }
-    return best;
+    const int left = low[1] < low[0] ? 1 : 0;
+    const int right = low[3] < low[2] ? 3 : 2;
+    return static_cast<std::size_t>(best[low[right] < low[left] ? right : left]);
 }
 
 /// Height gained along an axis by the edge that starts at a vertex of q.
@@ -384,18 +392,25 @@ int PolygonPair::sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const {
     return -sign_of_cross(p.ring[axis.index], p.ring[p.next(axis.index)], from, to);
 }
 
-std::size_t PolygonPair::lowest(AxisOf axis) const {
+Level PolygonPair::lowest_level(AxisOf axis) const {
     const PairedPolygon& q = other(axis.side);
-    std::size_t vertex = lowest_vertex(q, side(axis.side).axis(axis.index));
+    Level found{lowest_vertex(q, side(axis.side).axis(axis.index)), q.ring.size()};
     // Rounding of coordinates may have chosen a neighbour, or in a row of tiny edges one further off.
-    const auto is_lower = [&](std::size_t j) { return sign_of_height(axis, q.ring[vertex], q.ring[j]) < 0; };
-    for (std::size_t steps = 0; steps < q.edges && is_lower(q.next(vertex)); ++steps) {
-        vertex = q.next(vertex);
+    for (const bool forward : {true, false}) {
+        for (std::size_t steps = 0; steps < q.edges; ++steps) {
+            const std::size_t beside = forward ? q.next(found.vertex) : q.previous(found.vertex);
+            const int sign = sign_of_height(axis, q.ring[found.vertex], q.ring[beside]);
+            if (sign >= 0) {
+                found.neighbour = sign == 0 ? beside : found.neighbour;
+                break;
+            }
+            found = {beside, q.ring.size()};
+        }
     }
-    for (std::size_t steps = 0; steps < q.edges && is_lower(q.previous(vertex)); ++steps) {
-        vertex = q.previous(vertex);
+    if (found.neighbour == q.ring.size()) {
+        found.neighbour = found.vertex;
     }
-    return vertex;
+    return found;
 }
 
 Chain PolygonPair::lowest(AxisOf axis, std::size_t vertex, Slack slack) const {

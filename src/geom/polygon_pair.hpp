@@ -37,8 +37,9 @@ namespace geomsrv {
 
 /// Error of a gap, relative to |D|_1 times the reach of the pair, in units of kUnitRoundoff: edge, local
 /// coordinate, product and sum make 4 for each of the two projections, their difference 2 (it is at most 2
-/// |D|_1 reach); the rest covers second-order terms and the rounding of the bound.
-inline constexpr double kGapError = 12.0;
+/// |D|_1 reach), adding the bound to it 2 more; the rest covers second-order terms and the rounding of the
+/// bound.
+inline constexpr double kGapError = 14.0;
 
 /// Added for large polygons, whose supports are found by walking: an edge whose height is misjudged because
 /// it is within 5 units of level is worth 5 |D|_1 of its length, and all edges together are at most 8 reaches
@@ -102,6 +103,12 @@ inline Enclosed enclosed_dot(const ExactVec2& a, const ExactVec2& b) {
 struct Chain {
     std::size_t first = 0;
     std::size_t last = 0;
+};
+
+/// A vertex, and the one beside it that is exactly as low; itself if there is none.
+struct Level {
+    std::size_t vertex = 0;
+    std::size_t neighbour = 0;
 };
 
 /// An axis of one of the two polygons.
@@ -169,7 +176,8 @@ public:
     [[nodiscard]] Vec2 moved(Vec2 from, DoubleDouble x, DoubleDouble y) const;
 
     /// The vertex of the other polygon that is lowest along an axis, exactly; one of two that are level.
-    [[nodiscard]] std::size_t lowest(AxisOf axis) const;
+    [[nodiscard]] Level lowest_level(AxisOf axis) const;
+    [[nodiscard]] std::size_t lowest(AxisOf axis) const { return lowest_level(axis).vertex; }
     /// All that are as low as that one, up to rounding and `slack`.  Heights are summed over edges, which are
     /// relatively exact, so that nearly parallel edges of polygons far apart are told from parallel ones.
     [[nodiscard]] Chain lowest(AxisOf axis, std::size_t vertex, Slack slack) const;
