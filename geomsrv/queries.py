@@ -134,7 +134,8 @@ def distance_to_frustum(
     Returns
     -------
     Distances
-        ``distance`` (0 in the closed frustum), ``lower``, ``upper``, ``region``, ``point_a``.
+        ``distance`` (0 in the closed frustum), ``lower``, ``upper``, ``region``, ``point_a``.  "bound" measures from the
+        frustum's bounding sphere, below, and from the centre of that, above: its ``region`` is None, ``point_a`` NaN.
 
     Raises
     ------
@@ -162,21 +163,25 @@ def distance_to_frustum(
         (_core.distance_to_frustum, 3) if isinstance(frustum, Frustum) else (_core.distance_to_frustum_2d, 2)
     )
     array = _validate.floats(points, "points", (None, dimension))
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
-    packed = frustum.packed()
-    gap, lower, upper, region, point_a = kernel(packed, array, "witness" in effects)
+    given = frustum.packed(), array, tier
+    gap, lower, upper, region, point_a, simplex, rungs = kernel(*given, "witness" in effects, certified)
+
+    def nearest() -> FloatArray:
+        return np.full_like(array, np.nan) if tier == "bound" else cast(FloatArray, kernel(*given, True, False)[4])
+
     return Distances(
         distance=gap,
         lower=lower,
         upper=upper,
         point_b=array,
         status=np.zeros(len(array), np.uint8),
-        cost=Cost(time.perf_counter_ns() - start, tier, {"filter": len(array)}),
+        cost=Cost(time.perf_counter_ns() - start, tier, _stages(tier, rungs)),
         region=region,
-        _point_a=point_a if point_a is not None else lambda: cast(FloatArray, kernel(packed, array, True)[4]),
-        _record=certify_distances(frustum, array) if certified else None,
+        _point_a=nearest if point_a is None else point_a,
+        _record=certify_distances(frustum, array, simplex) if certified else None,
     )
 
 

@@ -13,7 +13,6 @@
 #include "bind/views.hpp"
 #include "geom/cull_evidence.hpp"
 #include "geom/frustum_box.hpp"
-#include "geom/point_frustum.hpp"
 
 namespace geomsrv::bind {
 
@@ -203,108 +202,6 @@ GEOMSRV_WIDE_CLONES void find_evidence(const Frustum& frustum, BoxRows boxes, st
     }
 }
 
-// ---------------------------------------------------------------------------------------------- points
-
-/// Where answers go; `nearest` is null if it was not asked for.
-struct PointAnswers {
-    double *distance, *lower, *upper;
-    std::uint8_t* region;
-    double* nearest;
-
-    template <int Sides>
-    void put(std::size_t i, const PointDistance<Sides>& answer) const {
-        distance[i] = answer.distance;
-        lower[i] = answer.lower;
-        upper[i] = answer.upper;
-        region[i] = answer.region;
-        if (nearest != nullptr) std::copy_n(answer.nearest, Sides + 1, nearest + (Sides + 1) * i);
-    }
-};
-
-/// Groups of four points.  What is out of range is done again, point by point.
-template <class Kinds, bool Skewed, int Sides>
-GEOMSRV_WIDE_CLONES void measure_points(const DistanceFrame<Lanes, Sides>& frame, const View<Sides>& view,
-                                        const double* points, std::size_t count, PointAnswers out) {
-    constexpr std::size_t kDimension = Sides + 1;
-    std::optional<DistanceFrame<long double, Sides>> wide;
-    for (std::size_t i = 0; i + Lanes::kCount <= count; i += Lanes::kCount) {
-        const FourRows<kDimension> point(points + kDimension * i);
-        const auto found = distance_to_frustum<Kinds, Skewed>(frame, point.at);
-        found.distance.store(out.distance + i);
-        found.lower.store(out.lower + i);
-        found.upper.store(out.upper + i);
-        store_bytes(found.region, out.region + i);
-        if (out.nearest != nullptr) {
-            const auto nearest = nearest_in_world(frame, point.at, found);
-            for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
-                for (std::size_t k = 0; k < kDimension; ++k) {
-                    out.nearest[kDimension * (i + lane) + k] = nearest.at[k][static_cast<int>(lane)];
-                }
-            }
-        }
-        if (!all(found.in_range)) [[unlikely]] {
-            if (!wide) wide = distance_frame<long double>(view);
-            for (std::size_t lane = 0; lane < Lanes::kCount; ++lane) {
-                if (found.in_range.v[lane] == 0) {
-                    out.put(i + lane, distance_in_long_double(*wide, points + kDimension * (i + lane)));
-                }
-            }
-        }
-    }
-}
-
-template <int Sides>
-void measure_all(const View<Sides>& view, const double* points, std::size_t count, PointAnswers out) {
-    constexpr std::size_t kDimension = Sides + 1;
-    if (!is_ordinary(view)) {
-        const auto frame = distance_frame<long double>(view);
-        for (std::size_t i = 0; i < count; ++i)
-            out.put(i, distance_in_long_double(frame, points + kDimension * i));
-        return;
-    }
-    const auto frame = distance_frame<Lanes>(view);
-    const auto measure = [&](const double* rows, std::size_t size, PointAnswers answers) {
-        with_windows(frame, [&](auto kinds) {
-            using Kinds = decltype(kinds);
-            (frame.refinements > 0 ? measure_points<Kinds, true, Sides>
-                                   : measure_points<Kinds, false, Sides>)(frame, view, rows, size, answers);
-        });
-    };
-    const std::size_t whole = count - count % Lanes::kCount;
-    measure(points, whole, out);
-    if (whole < count) {
-        // The last few points fill a group by repetition.
-        double padded[Lanes::kCount * kDimension], values[3][Lanes::kCount],
-            nearest[Lanes::kCount * kDimension];
-        std::uint8_t region[Lanes::kCount];
-        for (std::size_t k = 0; k < Lanes::kCount; ++k) {
-            std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension,
-                        padded + kDimension * k);
-        }
-        measure(padded, Lanes::kCount, {values[0], values[1], values[2], region, nearest});
-        for (std::size_t k = 0; whole + k < count; ++k) {
-            PointDistance<Sides> answer{values[0][k], values[1][k], values[2][k], region[k], {}};
-            std::copy_n(nearest + kDimension * k, kDimension, answer.nearest);
-            out.put(whole + k, answer);
-        }
-    }
-}
-
-template <int Sides, class Packed, class Points>
-nb::object distance_to_frustum_batch(const Packed& packed, const Points& points, bool witness) {
-    const std::size_t count = points.shape(0);
-    auto distance = empty<double>({count}), lower = empty<double>({count}), upper = empty<double>({count});
-    auto region = empty<std::uint8_t>({count});
-    Output<double> nearest{nb::none()};
-    if (witness) nearest = empty<double>({count, std::size_t{Sides + 1}});
-    {
-        const nb::gil_scoped_release unlocked;
-        measure_all(unpack_view<Sides>(packed.data()), points.data(), count,
-                    {distance.data, lower.data, upper.data, region.data, nearest.data});
-    }
-    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array);
-}
-
 }  // namespace
 
 void define_frustum(nb::module_& m) {
@@ -342,10 +239,6 @@ void define_frustum(nb::module_& m) {
         },
         nb::arg("frustum").noconvert(), nb::arg("center").noconvert(), nb::arg("axes").noconvert(),
         nb::arg("half_extents").noconvert(), nb::arg("accuracy"), nb::arg("evidence"));
-    m.def("distance_to_frustum", distance_to_frustum_batch<2, PackedFrustum, Rows3>,
-          nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
-    m.def("distance_to_frustum_2d", distance_to_frustum_batch<1, PackedFrustum2D, Rows2>,
-          nb::arg("frustum").noconvert(), nb::arg("points").noconvert(), nb::arg("witness"));
 }
 
 }  // namespace geomsrv::bind

@@ -7,7 +7,7 @@ NB_MODULE(_core, m) {
     m.doc() = "Batch geometry kernels; see geomsrv.queries for the public functions.";
     geomsrv::bind::define_validate(m);
     geomsrv::bind::define_frustum(m);
-    geomsrv::bind::define_point_frustum_tiers(m);
+    geomsrv::bind::define_point_frustum(m);
     geomsrv::bind::define_polygons(m);
     geomsrv::bind::define_distance(m);
     geomsrv::bind::define_broad_phase(m);

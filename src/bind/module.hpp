@@ -9,7 +9,7 @@ namespace geomsrv::bind {
 
 void define_validate(nanobind::module_& m);
 void define_frustum(nanobind::module_& m);
-void define_point_frustum_tiers(nanobind::module_& m);
+void define_point_frustum(nanobind::module_& m);
 void define_polygons(nanobind::module_& m);
 void define_distance(nanobind::module_& m);
 void define_broad_phase(nanobind::module_& m);

@@ -197,6 +197,15 @@ GEOMSRV_INLINE FloatLanes joined(const Lanes& low, const Lanes& high) {
                                               FloatLanes::Vector));
 }
 
+/// The halves of eight, to double precision.
+struct LanesPair {
+    Lanes low, high;
+};
+GEOMSRV_INLINE LanesPair parted(const FloatLanes& x) {
+    return {Lanes(__builtin_convertvector(__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3), Lanes::Vector)),
+            Lanes(__builtin_convertvector(__builtin_shufflevector(x.v, x.v, 4, 5, 6, 7), Lanes::Vector))};
+}
+
 GEOMSRV_INLINE double magnitude(double x) { return std::fabs(x); }
 GEOMSRV_INLINE long double magnitude(long double x) { return std::fabs(x); }
 

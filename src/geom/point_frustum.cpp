@@ -23,10 +23,21 @@ constexpr double kGramError = 12.0 * kUnitRoundoff;
 // k + 1, relative to the distance.  This is below what rounding leaves, and above the norm for axes that are
 // orthonormal but for rounding, which need no further projection.
 constexpr double kMaxContraction = 0x1p-48;
+constexpr double kMaxFloatContraction = 0x1p-20;
 
-/// double for Lanes: a frame is prepared in plain numbers.
+/// double for lanes: a frame is prepared in plain numbers.
 template <class Number>
-using Plain = std::conditional_t<std::is_same_v<Number, Lanes>, double, Number>;
+using Plain = std::conditional_t<std::is_same_v<Number, long double>, long double, double>;
+
+/// The same number in every lane.
+template <class Number>
+Number spread(Plain<Number> x) {
+    if constexpr (std::is_same_v<Number, FloatLanes>) {
+        return static_cast<float>(x);
+    } else {
+        return x;
+    }
+}
 
 /// Side number `index` of a frustum, lengths scaled by 2^-exponent; mirrored to x > 0 if it lies on the other
 /// side.
@@ -51,12 +62,13 @@ FrustumSide<Real> side_of(const View<Sides>& given, int index, int exponent) {
             .mirror = mirrored ? -1.0 : 1.0};
 }
 
-/// The same numbers in every lane.
-FrustumSide<Lanes> spread(const FrustumSide<double>& side) {
-    return {side.low_slope, side.high_slope, side.low,       side.high,   side.low_room,
-            side.high_room, side.low_code,   side.high_code, side.window, side.mirror};
+template <class Number>
+FrustumSide<Number> spread(const FrustumSide<Plain<Number>>& side) {
+    const auto each = [](Plain<Number> x) { return spread<Number>(x); };
+    return {each(side.low_slope), each(side.high_slope), each(side.low),       each(side.high),
+            each(side.low_room),  each(side.high_room),  each(side.low_code),  each(side.high_code),
+            side.window,          side.mirror};
 }
-FrustumSide<long double> spread(const FrustumSide<long double>& side) { return side; }
 
 /// Root for choice s of S and t of T.  Choices count the sides like digits, the first side fastest.
 template <class Number, int Sides>
@@ -79,9 +91,9 @@ DepthRoot<Number, Sides> root_of(const FrustumSide<Plain<Number>> (&sides)[Sides
         code += (low ? side.low_code : Real(0.0)) + (high ? side.high_code : Real(0.0));
     }
     DepthRoot<Number, Sides> root;
-    root.depth = view * view / squares;
-    for (int i = 0; i < Sides; ++i) root.side[i] = view * sum[i] / squares;
-    root.code = code;
+    root.depth = spread<Number>(view * view / squares);
+    for (int i = 0; i < Sides; ++i) root.side[i] = spread<Number>(view * sum[i] / squares);
+    root.code = spread<Number>(code);
     return root;
 }
 
@@ -107,9 +119,9 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
     DistanceFrame<Number, Sides> frame;
     const int exponent = std::ilogb(given.near);
     const Real view = std::scalbn(Real(given.near), -exponent);
-    frame.view = view;
-    frame.near = Real(given.near);
-    frame.far = Real(given.far);
+    frame.view = spread<Number>(view);
+    frame.near = spread<Number>(given.near);
+    frame.far = spread<Number>(given.far);
 
     FrustumSide<Real> sides[Sides];
     Real mirror[Sides + 1];
@@ -125,7 +137,7 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
         if (sides[i].window == Window::centred && !all_centred) sides[i].window = Window::around;
         s_count *= min_choices(sides[i].window);
         t_count *= max_choices(sides[i].window);
-        frame.side[i] = spread(sides[i]);
+        frame.side[i] = spread<Number>(sides[i]);
     }
     for (int k = 0; k < s_count * t_count; ++k) {
         frame.roots[k] = root_of<Number>(sides, view, k / t_count, k % t_count);
@@ -135,21 +147,22 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
     const auto defect = gram_defect<Real>(given.axes);
     Real squares = 0.0;
     for (int i = 0; i <= Sides; ++i) {
-        frame.origin[i] = Real(given.origin[i]);
+        frame.origin[i] = spread<Number>(given.origin[i]);
         for (int k = 0; k <= Sides; ++k) {
-            frame.axes.row[i][k] = mirror[i] * given.axes.row[i][k];
-            frame.dual.row[i][k] = mirror[i] * dual.row[i][k];
-            frame.defect.row[i][k] = mirror[i] * mirror[k] * defect.row[i][k];
+            frame.axes.row[i][k] = spread<Number>(mirror[i] * given.axes.row[i][k]);
+            frame.dual.row[i][k] = spread<Number>(mirror[i] * dual.row[i][k]);
+            frame.defect.row[i][k] = spread<Number>(mirror[i] * mirror[k] * defect.row[i][k]);
             squares += defect.row[i][k] * defect.row[i][k];
         }
     }
     const double norm = static_cast<double>(std::sqrt(squares)) + kGramError;
     double remaining = norm;
-    while (remaining > kMaxContraction) {
+    constexpr bool kSingle = std::is_same_v<Number, FloatLanes>;
+    while (remaining > (kSingle ? kMaxFloatContraction : kMaxContraction)) {
         remaining *= norm;
         ++frame.refinements;
     }
-    frame.relative_error = Real(kDistanceError + 2.0 * remaining);
+    frame.relative_error = spread<Number>(Precision<Number>::error(kDistanceError) + 2.0 * remaining);
     return frame;
 }
 
@@ -236,6 +249,8 @@ PointDistance<Sides> distance_in_long_double(const DistanceFrame<long double, Si
 
 template DistanceFrame<Lanes, 1> distance_frame(const View<1>&);
 template DistanceFrame<Lanes, 2> distance_frame(const View<2>&);
+template DistanceFrame<FloatLanes, 1> distance_frame(const View<1>&);
+template DistanceFrame<FloatLanes, 2> distance_frame(const View<2>&);
 template DistanceFrame<long double, 1> distance_frame(const View<1>&);
 template DistanceFrame<long double, 2> distance_frame(const View<2>&);
 template bool is_ordinary(const View<1>&);

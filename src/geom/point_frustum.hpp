@@ -80,8 +80,8 @@ struct DepthRoot {
     Number code;  ///< region of the sides whose slopes are in S and T
 };
 
-/// A frustum prepared for distances.  `Number` is Lanes, with every lane the same, or long double where a
-/// product might leave the range of double.
+/// A frustum prepared for distances.  `Number` is Lanes or FloatLanes, with every lane the same, or long double
+/// where a product might leave the range of double.
 template <class Number, int Sides>
 struct DistanceFrame {
     static constexpr int kDimension = Sides + 1;
@@ -228,6 +228,24 @@ inline constexpr double kRoomError = 20.0 * kUnitRoundoff;
 // Squares of lengths in this range are accurate: no term overflowed, and one that underflowed does not count.
 inline constexpr double kMinSquare = 0x1p-900;
 inline constexpr double kMaxSquare = 0x1p1000;
+inline constexpr float kMinFloatSquare = 0x1p-90F;
+inline constexpr float kMaxFloatSquare = 0x1p120F;
+
+/// An error that is counted in units of roundoff, and the range of squares, for a kind of number.
+///
+/// In single precision every count above is met with much to spare: the numbers of a frame and the point
+/// relative to the apex are rounded once each from double, so coordinates are off by 5 u (not 13) and roots by
+/// 4 u (not 11) of their terms; near and far, which are not exact there, by 1 u (|c| + d).
+template <class Number>
+struct Precision {
+    static constexpr auto error(double counted) { return counted; }
+    static constexpr auto kMin = kMinSquare, kMax = kMaxSquare;
+};
+template <>
+struct Precision<FloatLanes> {
+    static constexpr float error(double counted) { return static_cast<float>(counted * 0x1p29); }
+    static constexpr auto kMin = kMinFloatSquare, kMax = kMaxFloatSquare;
+};
 
 /// Distance of p from its nearest point, and the interval that is proven to hold the exact value.
 template <class Kinds, bool Skewed, class Number, int Sides>
@@ -235,6 +253,7 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
                                                    const Coordinates<Number, Sides>& p,
                                                    const Coordinates<Number, Sides>& offset,
                                                    const Number& region) {
+    using P = Precision<Number>;
     const Number z = p.at[Sides], none = 0.0;
     Number square = none;
     for (int i = 0; i <= Sides; ++i) {
@@ -263,12 +282,12 @@ GEOMSRV_INLINE NearestPoint<Number, Sides> measure(const DistanceFrame<Number, S
     const Mask<Number> inside = none <= room;
     const Number distance = select(inside, none, square_root(square));
     const Number slack = distance * frame.relative_error;
-    const Number lower = greater(distance - (reach * Number(kLowerError) + slack), none);
-    const Number upper =
-        select(reach * Number(kRoomError) < room, none, distance + (reach * Number(kUpperError) + slack));
+    const Number lower = greater(distance - (reach * Number(P::error(kLowerError)) + slack), none);
+    const Number upper = select(reach * Number(P::error(kRoomError)) < room, none,
+                                distance + (reach * Number(P::error(kUpperError)) + slack));
     const Number square_if_outside = select(inside, Number(1.0), square);
-    const Mask<Number> in_range = (Number(kMinSquare) < square_if_outside) &
-                                  (square_if_outside < Number(kMaxSquare)) & ((none < region) | inside);
+    const Mask<Number> in_range = (Number(P::kMin) < square_if_outside) &
+                                  (square_if_outside < Number(P::kMax)) & ((none < region) | inside);
     return {distance, lower, upper, select(distance <= none, none, region), offset, inside, in_range};
 }
 

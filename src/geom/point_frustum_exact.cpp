@@ -92,7 +92,7 @@ double rounded(const Enclosed& numerator, const Enclosed& denominator, bool& cer
     return out.nearest;
 }
 
-/// A point and up to three corners minus it, all times near, of which a corner has one too many.
+/// A point and up to three corners minus it, all times near.
 template <class N>
 struct Corners {
     N near;
@@ -101,7 +101,10 @@ struct Corners {
     Corners(const Frustum& frustum, Vec3 point, const int* corner, int count)
         : near(frustum.near), x(near * exactly<N>(point)) {
         const ExactBody body = body_of(frustum);
-        for (int i = 0; i < std::min(count, 3); ++i) w[i] = vertex_times_denominator<N>(body, corner[i]) - x;
+        const VectorOf<N> from_apex = near * (exactly<N>(point) - exactly<N>(frustum.origin));
+        for (int i = 0; i < std::min(count, 3); ++i) {
+            w[i] = arm_times_denominator<N>(body, corner[i]) - from_apex;
+        }
     }
     [[nodiscard]] VectorOf<N> edge() const { return w[1] - w[0]; }
     [[nodiscard]] VectorOf<N> normal() const { return cross(edge(), w[2] - w[0]); }

@@ -92,8 +92,7 @@ inline constexpr double kWideMargin = 96.0 * kUnitRoundoff;
 // Error of d to first order, in units of 2^-78 P, P <= m < 2 P.
 //
 // 1. A component of r.  Rests are at most 2^-25 P, and sums of them 3.7 times that; a rounding is 2^-53 of
-// its
-//    result.  Rest of p 1; six products with a rest 2.7, their sums 15.9; y's rests themselves 1.8, and y
+//    its result.  Rest of p 1; six products with a rest 2.7, their sums 15.9; y's rests themselves 1.8, and y
 //    where it multiplies the axes' rests 0.9: 22.3, as a vector 38.7.
 // 2. The remainder of the square, halved by 2 d.  b, the rest of r, is at most 4.7 * 2^-25 P in each
 //    component, 8.2 as a vector; its own rounding 8.2.  The sum of b (2 a + b): 12.3 for 2 a + b, 8.2 for the
