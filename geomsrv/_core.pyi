@@ -11,13 +11,13 @@ _U = NDArray[np.uint8]
 _B = NDArray[np.bool_]
 # distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
 _Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
-# the same, then rung (n,) (Rung in separation.hpp) and, as evidence, the simplex (n, 4, 2) of vertices of the difference
+# the same, then rung (n,) (rung.hpp) and, as evidence, the simplex (n, 4, 2) of vertices of the difference
 _ProvenDistances = tuple[_F, _F, _F, _F, _F, _F, _U, _U, NDArray[np.int32] | None]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
 # items answered by bounding volumes, by the filter, in double-double, exactly
 _Rungs = tuple[int, int, int, int]
-# distance, lower, upper (n,), region (n,), point_a (n, d), and as evidence the simplex (n, 4, 2) of a corner and the point
+# distance, lower, upper, region (n,), point_a (n, d), and as evidence the simplex (n, 4, 2) of corners and the point
 _PointDistances = tuple[_F, _F, _F, _U | None, _F | None, NDArray[np.int32] | None, _Rungs]
 
 def first_nonfinite(values: _F) -> int: ...

@@ -49,10 +49,10 @@ CULL_COUNTS = {
     "float64": ("bound", "filter", "uncertain"),
     "exact": ("bound", "filter", "wide", "exact"),
 }
-# What answers polygons, in the order in which the engine counts it, and how far a tier climbs.
+# What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
-CLIMB = {"bound": RUNGS[:1], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SOLID_TIERS = ("bound", "float64", "exact")
+CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
+SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of shapes
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -134,8 +134,9 @@ def distance_to_frustum(
     Returns
     -------
     Distances
-        ``distance`` (0 in the closed frustum), ``lower``, ``upper``, ``region``, ``point_a``.  "bound" measures from the
-        frustum's bounding sphere, below, and from the centre of that, above: its ``region`` is None, ``point_a`` NaN.
+        ``distance`` (0 in the closed frustum), ``lower``, ``upper``, ``region``, ``point_a``.  "bound" measures from
+        the frustum's bounding sphere, below, and from the centre of that, above: its ``region`` is None, ``point_a``
+        NaN.
 
     Raises
     ------
@@ -251,7 +252,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, tuple(CLIMB) if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, SHAPE_TIERS if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -330,7 +331,7 @@ def distance(
         found = _polygon_distance(a, b, signed, accuracy, start)[0]
         proven = _validate.certificates(certificates, found.cost.accuracy)
         return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
-    tier = _validate.accuracy(accuracy, SOLID_TIERS)
+    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
     certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
         answer, message = _batch_distance(a, b, signed, tier, certified), ""
@@ -429,7 +430,7 @@ def _polygon_distance(
     a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
 ) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
-    tier = _validate.accuracy(accuracy, tuple(CLIMB))
+    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(

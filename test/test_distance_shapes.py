@@ -43,7 +43,7 @@ KINDS = ("sphere", "capsule", "box", "convex", "half_space", "cylinder", "cone",
 WORST = {
     #             sphere capsule box   convex half_space
     "sphere":     (0.8,  0.8,    0.8,  0.8,   1.4),
-    "capsule":    (None, 0.8,    0.8,  0.8,   1.4),
+    "capsule":    (None, 0.8,    0.8,  0.8,   1.3),
     "box":        (None, None,   0.8,  0.8,   1.4),
     "convex":     (None, None,   None, 0.8,   1.4),
     "half_space": (None, None,   None, None,  0.0),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import hard_cases, reproducer
 from oracle import polygon as exact
-from oracle.vectors import compare_root, cross2, dot, nearest_double, root_double, squared_norm, sub
+from oracle.vectors import compare_root, dot, nearest_double, root_double, squared_norm, sub
 from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, slender_pair
 
 import geomsrv as gs
@@ -442,7 +442,10 @@ def test_law_relabelled_rings_is_bitwise(scenes, rng):
 
 def test_law_repeated_and_collinear_vertices_change_nothing(scenes):
     def refined(ring):
-        middle = [tuple(0.5 * (x + y) for x, y in zip(p, q, strict=True)) for p, q in zip(ring, ring[1:] + ring[:1])]
+        middle = [
+            tuple(0.5 * (x + y) for x, y in zip(p, q, strict=True))
+            for p, q in zip(ring, ring[1:] + ring[:1], strict=True)
+        ]
         return [v for p, m in zip(ring, middle, strict=True) for v in (p, p, m)]
 
     finer = [(refined(a), va, refined(b), vb, t) for a, va, b, vb, t in scenes]

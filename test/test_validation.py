@@ -553,9 +553,15 @@ QUERIES: dict[str, Callable[..., Any]] = {
 }
 
 
+EVERY = ("bound", "float32", "exact")
 TIERS_ANSWERED = {
-    name: ("bound", "float32", "exact")
-    for name in ("cull", "first_contact", "distance", "distance.batches", "intersects")
+    "cull": EVERY,
+    "distance_to_frustum": EVERY,
+    "distance_to_frustum.2d": EVERY,
+    "first_contact": ("bound", "exact"),
+    "distance": ("bound", "exact"),
+    "distance.batches": ("bound", "exact"),
+    "intersects": ("bound", "exact"),
 }  #: besides float64
 
 

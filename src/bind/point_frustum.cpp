@@ -66,8 +66,8 @@ struct LocalFrame<FloatLanes, Sides> {
     GEOMSRV_INLINE void load(const double* rows, FloatLanes (&point)[Sides + 1]) const {
         const FourRows<Sides + 1> low(rows), high(rows + (Sides + 1) * Lanes::kCount);
         for (int k = 0; k <= Sides; ++k) {
-            point[k] = joined((low.at[k] - origin[k]) * first * second,
-                              (high.at[k] - origin[k]) * first * second);
+            point[k] =
+                joined((low.at[k] - origin[k]) * first * second, (high.at[k] - origin[k]) * first * second);
         }
     }
     GEOMSRV_INLINE void store(const FloatLanes& length, double* to) const {
@@ -137,9 +137,8 @@ PointRungs measure_all(const View<Sides>& view, const double* points, std::size_
             const auto measure = local.frame.refinements > 0 ? measure_points<L, Kinds, true, Sides>
                                                              : measure_points<L, Kinds, false, Sides>;
             in_groups<L::kCount, Sides>(points, count, out,
-                                        [&](const double* rows, std::size_t size, PointAnswers answers, std::size_t) {
-                                            measure(local, view, rows, size, answers);
-                                        });
+                                        [&](const double* rows, std::size_t size, PointAnswers answers,
+                                            std::size_t) { measure(local, view, rows, size, answers); });
         });
     } else {
         const auto frame = distance_frame<long double>(view);
@@ -176,10 +175,10 @@ template <int Sides>
 PointRungs bound_all(const View<Sides>& view, const double* points, std::size_t count, PointAnswers out) {
     const BoundingSphere<Sides> sphere = bounding_sphere(view);
     const SphereFrame<Sides> frame(sphere);
-    in_groups<Lanes::kCount, Sides>(points, count, out,
-                                    [&](const double* rows, std::size_t size, PointAnswers answers, std::size_t) {
-                                        bound_points(frame, sphere, rows, size, answers);
-                                    });
+    in_groups<Lanes::kCount, Sides>(
+        points, count, out, [&](const double* rows, std::size_t size, PointAnswers answers, std::size_t) {
+            bound_points(frame, sphere, rows, size, answers);
+        });
     return {.bound = static_cast<std::int64_t>(count)};
 }
 
@@ -213,8 +212,8 @@ nb::object distance_to_frustum_batch(const Packed& packed, const Points& points,
             find_simplices(view, points.data(), count, region.data, tier != "exact", simplex.data);
         }
     }
-    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array, simplex.array,
-                          nb::make_tuple(rungs.bound, rungs.filter, rungs.wide, rungs.exact));
+    return nb::make_tuple(distance.array, lower.array, upper.array, region.array, nearest.array,
+                          simplex.array, nb::make_tuple(rungs.bound, rungs.filter, rungs.wide, rungs.exact));
 }
 
 }  // namespace

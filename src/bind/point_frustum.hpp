@@ -47,7 +47,8 @@ void in_groups(const double* points, std::size_t count, PointAnswers out, const 
     double padded[Group * kDimension], values[3][Group], nearest[Group * kDimension];
     std::uint8_t region[Group];
     for (std::size_t k = 0; k < Group; ++k) {
-        std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension, padded + kDimension * k);
+        std::copy_n(points + kDimension * std::min(whole + k, count - 1), kDimension,
+                    padded + kDimension * k);
     }
     const PointAnswers last = out.from(whole, kDimension);
     measure(padded, Group,

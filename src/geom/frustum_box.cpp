@@ -14,7 +14,7 @@ namespace {
 template <class Real>
 constexpr bool kIsDouble = std::is_same_v<Real, double>;
 
-/// Unit roundoff.
+/// Unit roundoff of the precision at hand.
 template <class Real>
 constexpr Real kRoundoff = std::numeric_limits<Real>::epsilon() / 2;
 

@@ -65,9 +65,10 @@ FrustumSide<Real> side_of(const View<Sides>& given, int index, int exponent) {
 template <class Number>
 FrustumSide<Number> spread(const FrustumSide<Plain<Number>>& side) {
     const auto each = [](Plain<Number> x) { return spread<Number>(x); };
-    return {each(side.low_slope), each(side.high_slope), each(side.low),       each(side.high),
-            each(side.low_room),  each(side.high_room),  each(side.low_code),  each(side.high_code),
-            side.window,          side.mirror};
+    return {each(side.low_slope), each(side.high_slope), each(side.low),
+            each(side.high),      each(side.low_room),   each(side.high_room),
+            each(side.low_code),  each(side.high_code),  side.window,
+            side.mirror};
 }
 
 /// Root for choice s of S and t of T.  Choices count the sides like digits, the first side fastest.

@@ -80,8 +80,8 @@ struct DepthRoot {
     Number code;  ///< region of the sides whose slopes are in S and T
 };
 
-/// A frustum prepared for distances.  `Number` is Lanes or FloatLanes, with every lane the same, or long double
-/// where a product might leave the range of double.
+/// A frustum prepared for distances.  `Number` is Lanes or FloatLanes, with every lane the same, or long
+/// double where a product might leave the range of double.
 template <class Number, int Sides>
 struct DistanceFrame {
     static constexpr int kDimension = Sides + 1;
@@ -234,8 +234,8 @@ inline constexpr float kMaxFloatSquare = 0x1p120F;
 /// An error that is counted in units of roundoff, and the range of squares, for a kind of number.
 ///
 /// In single precision every count above is met with much to spare: the numbers of a frame and the point
-/// relative to the apex are rounded once each from double, so coordinates are off by 5 u (not 13) and roots by
-/// 4 u (not 11) of their terms; near and far, which are not exact there, by 1 u (|c| + d).
+/// relative to the apex are rounded once each from double, so coordinates are off by 5 u (not 13) and roots
+/// by 4 u (not 11) of their terms; near and far, which are not exact there, by 1 u (|c| + d).
 template <class Number>
 struct Precision {
     static constexpr auto error(double counted) { return counted; }

@@ -51,7 +51,8 @@ template <int Sides>
 BoundingSphere<Sides> bounding_sphere(const View<Sides>& view) {
     // On the ray through the middle of the window, as far from the corners of the near plane as from those of
     // the far plane; in the far plane at the most.
-    long double middle[Sides], ray_square = static_cast<long double>(view.near) * view.near, half_square = 0.0L;
+    long double middle[Sides], ray_square = static_cast<long double>(view.near) * view.near,
+                               half_square = 0.0L;
     for (int i = 0; i < Sides; ++i) {
         middle[i] = (static_cast<long double>(view.low[i]) + view.high[i]) / 2;
         const long double half = (static_cast<long double>(view.high[i]) - view.low[i]) / 2;

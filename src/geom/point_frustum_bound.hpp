@@ -1,7 +1,7 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
-// Distance of points from the bounding sphere of a frustum: a lower bound of that from the frustum, never above
-// it.  The centre of the sphere is a point of the frustum, so its distance is an upper one.
+// Distance of points from the bounding sphere of a frustum: a lower bound of that from the frustum, never
+// above it.  The centre of the sphere is a point of the frustum, so its distance is an upper one.
 #pragma once
 
 #include "geom/point_frustum.hpp"
@@ -30,12 +30,13 @@ struct DistanceBounds {
     LaneMask in_range;
 };
 
-// The distance from the centre, 1 u for differences, 3 u for squares and sums, halved by the root with its own
-// 1 u: 4 u, and 1 u for the last operation.
+// The distance from the centre, 1 u for differences, 3 u for squares and sums, halved by the root with its
+// own 1 u: 4 u, and 1 u for the last operation.
 inline constexpr double kCenterError = 6.0 * kUnitRoundoff;
 
 template <int Sides>
-GEOMSRV_INLINE DistanceBounds distance_bounds(const SphereFrame<Sides>& sphere, const Lanes (&point)[Sides + 1]) {
+GEOMSRV_INLINE DistanceBounds distance_bounds(const SphereFrame<Sides>& sphere,
+                                              const Lanes (&point)[Sides + 1]) {
     Lanes square = 0.0;
     for (int k = 0; k <= Sides; ++k) {
         const Lanes x = point[k] - sphere.center[k];

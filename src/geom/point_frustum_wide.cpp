@@ -11,6 +11,7 @@ namespace geomsrv {
 namespace {
 
 Halves<Lanes> halved_entry(double x) {
+    // A sum with it has no bits below kAxisUnit: what is added is rounded to whole units.
     constexpr double kRounder = 1.5 * 0x1p52 * kAxisUnit;
     const double coarse = (kRounder + x) - kRounder;
     return {coarse, x - coarse};
@@ -50,9 +51,11 @@ WideFrame<Sides> wide_frame(const View<Sides>& view, const DistanceFrame<Lanes, 
     // |slope| times that in the others: q P with P the power of two in the reach m < 2 P.  Where the error e
     // P passes Ziv's test, d > 2^53 e P, so what is lost to second order, (q P)^2 / 2 d, is at most 2^-54 q^2
     // P / e.  That and the first order together are e P for this e:
+    // The 2^-54 of this derivation.
+    constexpr double kSecondOrder = 0x1p-54;
     const double q = 2.0 * margin * steep;
     const double half = 0.5 * kWideError;
-    wide.error = (half + std::sqrt(half * half + 0x1p-54 * (q * q))) / kRounder;
+    wide.error = (half + std::sqrt(half * half + kSecondOrder * (q * q))) / kRounder;
     return wide;
 }
 

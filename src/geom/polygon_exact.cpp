@@ -33,6 +33,7 @@ DoubleDouble quotient(DoubleDouble a, DoubleDouble b, double inverse) {
 
 /// a / b.
 Enclosed ratio(const Enclosed& a, const Enclosed& b) {
+    // For errors of b below this part of it 1 / (|b| - |db|) < (1 + 2 of it) / |b|.
     constexpr double kSmallRelative = 0x1p-20;
     const double size = std::fabs(b.value.hi);
     if (!is_safe(a.value.hi) || !is_safe(size) || !(b.error < kSmallRelative * size)) {
