@@ -554,8 +554,8 @@ QUERIES: dict[str, Callable[..., Any]] = {
 
 
 TIERS_ANSWERED = {
-    name: ("bound", "float32", "exact")
-    for name in ("cull", "first_contact", "distance", "distance.batches", "intersects")
+    **dict.fromkeys(("cull", "first_contact"), ("bound", "float32", "exact")),
+    **dict.fromkeys(("distance", "distance.batches", "intersects"), ("bound", "exact")),
 }  #: besides float64
 
 
