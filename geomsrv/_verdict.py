@@ -140,8 +140,10 @@ def _point(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]:
     answer = distance_to_frustum(case.bodies[0], [case.given["point"]], accuracy=accuracy)
     yield _number("distance", answer, flat, accuracy)
     low, high = float(answer.lower[0]), float(answer.upper[0])
-    certain = low > 0.0 or high == 0.0
-    right = (answer.distance[0] == 0.0) == truth.meets
+    # Correctly rounded, a distance below the smallest double has a positive upper bound; 0 has none.
+    certain = accuracy == "exact" or low > 0.0 or high == 0.0
+    inside = high == 0.0 if accuracy == "exact" else answer.distance[0] == 0.0
+    right = inside == truth.meets
     yield _boolean(right or (accuracy == "bound" and not certain), certain, False, f"in [{low!r}, {high!r}]")
 
 
