@@ -145,6 +145,120 @@ def _scene_scenarios(n: int) -> list[Scenario]:
     return [Scenario(f"scene step, {n:,} boxes, pairs within 2 cm", None, (step, n))]
 
 
+@dataclass
+class Price:
+    """What a stronger answer costs: the same call twice, as ratio of CPU times."""
+
+    name: str
+    most: float  # the ratio wanted
+    items: int
+    plain: Call
+    stronger: Call
+    ns: tuple[float, float] = (0.0, 0.0)
+    most_ns: float | None = None
+
+    def run(self, rounds: int) -> None:
+        """Time both, taking turns."""
+        samples: tuple[list[float], list[float]] = ([], [])
+        for turn in range(rounds + 1):  # the first turn warms up
+            for call, times in zip((self.plain, self.stronger), samples, strict=True):
+                begin = time.thread_time_ns()
+                call()
+                if turn:
+                    times.append((time.thread_time_ns() - begin) / self.items)
+        self.ns = (statistics.median(samples[0]), statistics.median(samples[1]))
+
+    @property
+    def met(self) -> bool:
+        """Whether both wishes came true."""
+        return self.ns[1] <= self.most * self.ns[0] and (self.most_ns is None or self.ns[1] <= self.most_ns)
+
+
+def prices(quick: bool) -> list[Price]:
+    """Exact against float64, and with a certificate against without."""
+    cut = 10 if quick else 1
+    camera, boxes = scenarios.boxes_half_visible(100_000 // cut)
+    _, points = scenarios.points_around_frustum(1_000_000 // cut)
+    a, b, velocity_a, velocity_b = scenarios.moving_polygons(100_000 // cut)
+    few = 10_000 // cut
+    deep = ("distance", "penetration")
+    calls: list[tuple[str, float, float | None, int, Callable[..., object]]] = [
+        ("cull, generic", 1.3, None, len(boxes), lambda **k: gs.cull(camera, boxes, **k)),
+        ("point to frustum, generic", 1.3, None, len(points), lambda **k: gs.distance_to_frustum(camera, points, **k)),
+        (
+            "first contact of polygons, generic",
+            1.3,
+            None,
+            len(a),
+            lambda **k: gs.first_contact(a, b, velocity_a, velocity_b, **k),
+        ),
+    ]
+    far, near = scenarios.relative_poses(few, 0.35, 1.0), scenarios.relative_poses(few, 0.0, 0.1)
+    for name in ("box-box", "hull16-hull16", "hull64-hull64"):
+        p, q = scenarios.SHAPE_PAIRS[name]
+        calls += [
+            (f"distance {name}, apart", 2.0, None, few, lambda p=p, q=q, **k: gs.distance(p, q, far, **k)),
+            (f"penetration {name}", 2.0, None, few, lambda p=p, q=q, **k: gs.distance(p, q, near, want=deep, **k)),
+        ]
+    for degrees in (0, 30):
+        view, seen = scenarios.view_of_a_warehouse(few, degrees)
+        left, right = scenarios.warehouse(few, degrees)
+        calls += [
+            (f"cull, all touch, turned {degrees}", 20.0, 5000.0, few, lambda v=view, s=seen, **k: gs.cull(v, s, **k)),
+            (
+                f"distance box-box, all touch, turned {degrees}",
+                20.0,
+                None,
+                few,
+                lambda p=left, q=right, **k: gs.distance(p, q, **k),
+            ),
+        ]
+    table = []
+    for name, most, most_ns, items, call in calls:
+        exact = lambda call=call: call(accuracy="exact")  # noqa: E731
+        table.append(Price(f"exact: {name}", most, items, call, exact, most_ns=most_ns))
+        if most_ns is None and most < 20.0:
+            proven = lambda call=call: call(certificates=True)  # noqa: E731
+            table.append(Price(f"certificate: {name}", 3.0, items, call, proven))
+    return table
+
+
+def verifications_per_second(quick: bool) -> float:
+    """How many certificates the independent checker proves in a second, of all queries together."""
+    few = 100 if quick else 500
+    camera, boxes = scenarios.boxes_half_visible(few)
+    a, b, velocity_a, velocity_b = scenarios.moving_polygons(few)
+    p, q = scenarios.SHAPE_PAIRS["box-box"]
+    answers = [
+        gs.cull(camera, boxes, certificates=True),
+        gs.first_contact(a, b, velocity_a, velocity_b, certificates=True),
+        gs.distance(p, q, scenarios.relative_poses(few, 0.35, 1.0), certificates=True),
+    ]
+    begin = time.thread_time()
+    for answer in answers:
+        gs.verify(answer)
+    return len(answers) * few / (time.thread_time() - begin)
+
+
+def print_prices(console: Console, table: list[Price]) -> None:
+    """Ratios and wishes."""
+    out = Table(title="Price of exactness and of proof: ratio to the same query at float64, in one run")
+    for heading in ("query", "items", "float64 ns", "stronger ns", "ratio", "wanted"):
+        out.add_column(heading, justify="left" if heading == "query" else "right")
+    for p in table:
+        wish = f"{p.most:g}" + ("" if p.most_ns is None else f", {p.most_ns:g} ns")
+        ratio = p.ns[1] / p.ns[0]
+        out.add_row(
+            p.name,
+            f"{p.items:,}",
+            f"{p.ns[0]:,.1f}",
+            f"{p.ns[1]:,.1f}",
+            f"{ratio:.2f}",
+            f"{wish} {'met' if p.met else 'MISSED'}",
+        )
+    console.print(out)
+
+
 def print_table(console: Console, table: list[Scenario]) -> None:
     """Medians and ratios."""
     out = Table(title="Batch calls from Python, one core, medians of CPU time")
@@ -171,6 +285,15 @@ def main() -> None:
         scenario.run(3 if arguments.quick else 9)
     if table:
         print_table(console, table)
+    paid = [p for p in prices(arguments.quick) if arguments.only in p.name]
+    for price in paid:
+        price.run(3 if arguments.quick else 9)
+    if paid:
+        print_prices(console, paid)
+    if arguments.only in "verify":
+        console.print(
+            f"gs.verify: {verifications_per_second(arguments.quick):,.0f} certificates a second (1,000 wanted)"
+        )
     node = ros.measure(arguments.quick) if arguments.only in "node" else []
     for line in node:
         console.print(line)
@@ -179,6 +302,7 @@ def main() -> None:
             "machine": platform.processor() or platform.machine(),
             "python": platform.python_version(),
             "scenarios": {s.name: s.median_ns for s in table},
+            "prices": {p.name: p.ns for p in paid},
             "node": [str(line) for line in node],
         }
         arguments.json.write_text(json.dumps(record, indent=2) + "\n")
