@@ -321,6 +321,8 @@ private:
     }
 
     static Rows rows_of(const nb::tuple& arrays) {
+        constexpr const char* kFault =
+            "distance: a side must be (center, axes, half_extents), (vertices, offsets) or (packed frustum,)";
         try {
             switch (arrays.size()) {
                 case 1:
@@ -333,11 +335,9 @@ private:
                     break;
             }
         } catch (const std::bad_cast&) {
-            // Said below, with the rest.
+            throw nb::type_error(kFault);
         }
-        throw nb::type_error(
-            "distance: a side must be (center, axes, half_extents), (vertices, offsets) or "
-            "(packed frustum,)");
+        throw nb::type_error(kFault);
     }
 
     Rows rows_;

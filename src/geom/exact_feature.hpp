@@ -192,7 +192,7 @@ private:
 
     bool set_ = false;
     union {
-        T value_;
+        T value_;  // NOLINT(readability-identifier-naming): private, though the union does not say so
     };
 };
 

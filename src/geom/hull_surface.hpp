@@ -39,13 +39,14 @@ struct HullFacet {
 /// it; measured(facet) sets normal, offset and error.
 template <class Owner>
 class HullSurface {
-protected:
+    friend Owner;
     HullSurface() : memory_(buffer_.data(), buffer_.size()) {
         vertices_.reserve(64);
         facets_.reserve(160);
         heap_.reserve(192);
     }
 
+protected:
     static std::size_t at(int i) { return static_cast<std::size_t>(i); }
     [[nodiscard]] Vec3 w(int i) const { return vertices_[at(i)].w; }
 
