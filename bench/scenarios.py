@@ -90,3 +90,41 @@ SHAPE_PAIRS = {
     "hull16-hull16": (hull(16), hull(16)),
     "hull64-hull64": (hull(64), hull(64)),
 }
+
+
+def warehouse(n: int, degrees: float) -> tuple[gs.Boxes, gs.Boxes]:
+    """n pairs of neighbours in a stack of boxes on a grid: every pair shares a face, exactly so before it is turned.
+
+    Turning rounds: then a pair overlaps or is apart by an ulp or two, which float64 cannot tell.
+    """
+    rng = np.random.default_rng(SEED)
+    cell = np.array([0.75, 0.5, 0.25])
+    at = rng.integers(-40, 40, (n, 3))
+    step = np.eye(3, dtype=int)[rng.integers(0, 3, n)]
+    half = np.tile(cell / 2, (n, 1))
+    return _turned(at * cell, half, degrees), _turned((at + step) * cell, half, degrees)
+
+
+def view_of_a_warehouse(n: int, degrees: float) -> tuple[gs.Frustum, gs.Boxes]:
+    """Boxes on a grid that touch a plane of the view pyramid, which looks down the aisle at 45 degrees to each side."""
+    rng = np.random.default_rng(SEED)
+    near, half = 1.0, 0.25
+    depth = near + 2 * half * rng.integers(1, 60, n)
+    across = 2 * half * rng.integers(-2, 3, n)
+    # Left and right: the corner nearest to the axis lies on the side; near: the far face lies in the plane.
+    center = np.column_stack([depth + 2 * half, across, depth])
+    center[1::3, 0] *= -1.0
+    center[2::3] = np.column_stack([0.5 * across, across, np.full(n, near - half)])[2::3]
+    turn = _turn(degrees)
+    return gs.Frustum([0, 0, 0], turn.T, near, near, near, 40.0), _turned(center, np.full((n, 3), half), degrees)
+
+
+def _turn(degrees: float) -> np.ndarray:
+    """About z then x, so that no axis of the world stays one."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _turned(center: np.ndarray, half: np.ndarray, degrees: float) -> gs.Boxes:
+    turn = _turn(degrees)
+    return gs.Boxes(center @ turn.T, np.tile(turn.T, (len(center), 1, 1)), half)

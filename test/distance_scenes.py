@@ -52,7 +52,12 @@ def any_turn(rng: np.random.Generator) -> np.ndarray:
 
 def rotation(turn: np.ndarray) -> np.ndarray:
     """The matrix that the engine takes literally."""
-    return _validate.rotation_matrices((turn / np.linalg.norm(turn))[None])[0]
+    return matrix_of(_validate.poses(np.append(np.zeros(3), turn))[0])
+
+
+def matrix_of(pose: np.ndarray) -> np.ndarray:
+    """The same of a pose that is not normalised again."""
+    return _validate.rotation_matrices(pose[None, 3:])[0]
 
 
 # ----------------------------------------------------------------------------------------------- exact answers
@@ -72,32 +77,43 @@ def core(shape: gs.Shape) -> tuple[list[list[float]], float]:
 
 def posed(vertices: Any, pose: np.ndarray) -> list[vectors.Vector]:
     """Vertices in the frame of a, exactly."""
-    matrix = [vectors.exact(row) for row in rotation(pose[3:]).tolist()]
-    shift = vectors.exact(pose[:3].tolist())
-    return [vectors.add(tuple(vectors.dot(row, vectors.exact(v)) for row in matrix), shift) for v in vertices]
+    return _moved(vertices, rotation(pose[3:]), pose[:3])
+
+
+def _moved(vertices: Any, matrix: np.ndarray, shift: np.ndarray) -> list[vectors.Vector]:
+    rows, by = [vectors.exact(row) for row in matrix.tolist()], vectors.exact(shift.tolist())
+    return [vectors.add(tuple(vectors.dot(row, vectors.exact(v)) for row in rows), by) for v in vertices]
 
 
 def exact_pair(a: gs.Shape, b: gs.Shape, pose: np.ndarray) -> tuple[Fraction, Fraction]:
     """Signed square of the cores' distance (minus the squared depth), and the sum of the radii."""
     if isinstance(a, gs.HalfSpace) or isinstance(b, gs.HalfSpace):
-        return _exact_half_space(a, b, pose)
+        return exact_half_space((a, np.eye(3), np.zeros(3)), (b, rotation(pose[3:]), pose[:3]))
     (vertices_a, radius_a), (vertices_b, radius_b) = core(a), core(b)
     square = polytope.separation([vectors.exact(v) for v in vertices_a], posed(vertices_b, pose)).signed_square
     return square, Fraction(radius_a) + Fraction(radius_b)
 
 
-def _exact_half_space(a: gs.Shape, b: gs.Shape, pose: np.ndarray) -> tuple[Fraction, Fraction]:
-    if isinstance(a, gs.HalfSpace):
-        vertices, radius = core(b)
-        normal, offset = vectors.exact(a.normal.tolist()), Fraction(a.offset)
-        excess = min(vectors.dot(normal, v) for v in posed(vertices, pose)) - offset
-    else:
-        vertices, radius = core(a)
-        matrix = [vectors.exact(row) for row in rotation(pose[3:]).tolist()]
-        normal = tuple(vectors.dot(row, vectors.exact(b.normal.tolist())) for row in matrix)
-        shift = vectors.exact(pose[:3].tolist())
-        excess = min(vectors.dot(normal, vectors.sub(vectors.exact(v), shift)) for v in vertices) - Fraction(b.offset)
+PlacedShape = tuple[gs.Shape, np.ndarray, np.ndarray]  # with its matrix and position, both literal
+
+
+def exact_half_space(a: PlacedShape, b: PlacedShape) -> tuple[Fraction, Fraction]:
+    """The same of a half space and a body, whichever comes first."""
+    plane, (body, *place) = (a, b) if isinstance(a[0], gs.HalfSpace) else (b, a)
+    vertices, radius = core(body)
+    normal, offset = exact_plane(*plane)
+    excess = min(vectors.dot(normal, v) for v in _moved(vertices, *place)) - offset
     return excess * abs(excess) / vectors.squared_norm(normal), Fraction(radius)
+
+
+def exact_plane(half_space: gs.HalfSpace, matrix: np.ndarray, shift: np.ndarray) -> tuple[vectors.Vector, Fraction]:
+    """Normal m and offset of what the matrix makes of a half space: m . R x = n . x, so m is n times R^-1, not R^T."""
+    rows = [vectors.exact(row) for row in matrix.tolist()]
+    cofactors = [vectors.cross(rows[i - 2], rows[i - 1]) for i in range(3)]
+    own = vectors.exact(half_space.normal.tolist())
+    determinant = vectors.dot(rows[0], cofactors[0])
+    normal = tuple(vectors.dot(row, own) / determinant for row in cofactors)
+    return normal, Fraction(half_space.offset) + vectors.dot(normal, vectors.exact(shift.tolist()))
 
 
 def signed_root(square: Fraction, radii: Fraction = Fraction(0)) -> float:

@@ -14,18 +14,23 @@ from distance_scenes import (
     EPS,
     STAGES,
     Tally,
+    any_turn,
     core,
+    exact_half_space,
     exact_pair,
     in_interval,
+    matrix_of,
     ordinary_hull,
     random_turn,
     rotation,
+    shape,
     signed_root,
     stages_of_pair,
 )
+from oracle.vectors import compare_root
 
 import geomsrv as gs
-from geomsrv import _core
+from geomsrv import _core, _validate
 from geomsrv.shapes import pack
 
 DEEP = ("penetration",)
@@ -370,6 +375,97 @@ def test_half_spaces_parallel_up_to_rounding_of_the_pose() -> None:
         assert answer.distance[0] == -np.inf
 
 
+# ------------------------------------------------------------------------- half spaces far away, turned, in scenes
+
+
+def far_position(rng: np.random.Generator, size: float) -> np.ndarray:
+    return rng.normal(size=3) * size * 10.0 ** rng.uniform(-1.0, 8.0)
+
+
+def unit_pose(position: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    return _validate.poses(np.append(position, turn))[0]
+
+
+def sized(shape: gs.Shape, size: float) -> gs.Shape:
+    if isinstance(shape, gs.Sphere):
+        return gs.Sphere(size * shape.radius)
+    if isinstance(shape, gs.Capsule):
+        return gs.Capsule(size * shape.radius, size * shape.length)
+    if isinstance(shape, gs.Box):
+        return gs.Box(size * shape.half_extents)
+    if isinstance(shape, gs.Convex):
+        return gs.Convex(size * shape.vertices)
+    return gs.HalfSpace(shape.normal, size * shape.offset)
+
+
+def encloses(answers: Any, square: Any, radii: Any) -> bool:
+    """Whether the one interval of these answers, with depth and without, holds the exact distance."""
+    deep, plain = answers
+    positive = (square, radii) if compare_root(radii, square) < 0 else (0, 0)
+    return in_interval(square, radii, deep.lower[0], deep.upper[0]) and in_interval(
+        *positive, plain.lower[0], plain.upper[0]
+    )
+
+
+@pytest.mark.parametrize("order", ["first", "second"])
+@pytest.mark.parametrize("kind", SUPPORTED[:4])
+def test_turned_half_space_far_away(kind: str, order: str, rng: np.random.Generator) -> None:
+    """At a distance it shows that the inverse of a rounded rotation is not its transpose."""
+    for _ in range(60):
+        size = 10.0 ** rng.uniform(-6.0, 6.0)
+        pair = [sized(shape(rng, kind), size), sized(shape(rng, "half_space"), size)]
+        a, b = pair if order == "second" else pair[::-1]
+        pose = unit_pose(far_position(rng, size), any_turn(rng))
+        if rng.random() < 0.5:  # brought to touching
+            answer = gs.distance(a, b, pose, want=DEEP)
+            pose[:3] -= answer.normal[0] * answer.distance[0]
+        answers = gs.distance(a, b, pose, want=DEEP), gs.distance(a, b, pose)
+        assert encloses(answers, *exact_pair(a, b, pose)), reproducer(a=a, b=b, pose=pose)
+
+        ends = [unit_pose(far_position(rng, size), any_turn(rng)) for _ in range(2)]
+        scene = gs.Scene()
+        scene.apply(gs.SceneUpdate(add=[gs.SceneObject(*x) for x in zip("ab", (a, b), ends, strict=True)]))
+        answers = scene.distances(np.inf, want=DEEP), scene.distances(np.inf)
+        placed = [(s, matrix_of(p), p[:3]) for s, p in zip((a, b), scene.world.poses, strict=True)]
+        assert encloses(answers, *exact_half_space(*placed)), reproducer(a=a, b=b, pose_a=ends[0], pose_b=ends[1])
+
+
+def test_offset_that_cancels(rng: np.random.Generator) -> None:
+    """The plane passes the body so closely that two doubles do not hold the sum of its terms."""
+    for _ in range(300):
+        a, b = gs.Convex([rng.normal(size=3) * 10.0]), gs.HalfSpace(rng.normal(size=3), 10.0 * rng.normal())
+        pose = np.append(rng.normal(size=3) * 10.0, np.eye(4)[rng.integers(4)])  # a turn without rounding
+        for _ in range(2):
+            answer = gs.distance(a, b, pose, want=DEEP)
+            pose[:3] -= answer.normal[0] * answer.distance[0]
+        answers = gs.distance(a, b, pose, want=DEEP), gs.distance(a, b, pose)
+        assert encloses(answers, *exact_pair(a, b, pose)), reproducer(a=a, b=b, pose=pose)
+
+
+def floor_and_ceiling(turn_floor: Any, turn_ceiling: Any) -> gs.Scene:
+    """Solid below z = 1 and above z = 3, in the frame of each."""
+    objects = [
+        gs.SceneObject("floor", gs.HalfSpace([0, 0, 1], 1.0), [0, 0, 0, *turn_floor]),
+        gs.SceneObject("ceiling", gs.HalfSpace([0, 0, -1], -3.0), [0, 0, 0, *turn_ceiling]),
+    ]
+    scene = gs.Scene()
+    scene.apply(gs.SceneUpdate(add=objects))
+    return scene
+
+
+def test_half_spaces_turned_in_a_scene() -> None:
+    """Parallel as far as a rounded rotation lets one know: at most the gap apart.  Leaning for certain: they meet."""
+    about_z = [0.0, 0.0, 0.6, 0.8]
+    for turns in ((about_z, IDENTITY), (IDENTITY, about_z), ([0.1, 0.7, 0.1, 0.7], [0.1, 0.7, 0.1, 0.7])):
+        deep, plain = (floor_and_ceiling(*turns).distances(np.inf, want=want) for want in (DEEP, ()))
+        assert deep.lower[0] == -np.inf and plain.lower[0] == 0.0
+        assert 2.0 <= deep.upper[0] == plain.upper[0] <= 2.0 + 1e-12
+    for turn in ([0.6, 0.0, 0.0, 0.8], [1e-9, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]):
+        deep, plain = (floor_and_ceiling(turn, IDENTITY).distances(np.inf, want=want) for want in (DEEP, ()))
+        assert deep.distance[0] == deep.lower[0] == deep.upper[0] == -np.inf
+        assert plain.distance[0] == plain.lower[0] == plain.upper[0] == 0.0
+
+
 # ------------------------------------------------------------------------------------------ without depth, tiers
 
 
@@ -393,8 +489,8 @@ def test_without_penetration_overlapping_bodies_have_a_common_point(
         # A member of both: at no distance from either, its rounding apart.
         point = plain.point_a[0]
         local = rotation(pose[3:]).T @ (point - pose[:3])
-        for shape, p in ((a, point), (b, local)):
-            assert gs.distance(shape, gs.Sphere(0.0), [*p, *IDENTITY]).distance[0] <= 1e-15 * max(1.0, np.abs(p).max())
+        for solid, p in ((a, point), (b, local)):
+            assert gs.distance(solid, gs.Sphere(0.0), [*p, *IDENTITY]).distance[0] <= 1e-15 * max(1.0, np.abs(p).max())
     tally.require(overlapping=5)
 
 

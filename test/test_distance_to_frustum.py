@@ -494,6 +494,21 @@ def test_batches_of_any_length_agree(crowd, count, scale):
         assert (getattr(part, name) == getattr(whole, name)[:count]).all(), name
 
 
+def test_large_batches_answer_alike(crowd):
+    """Results of some MB are allocated in another way, by themselves and for whoever holds them."""
+    frustum, points = crowd
+    copies = 600
+    answer = gs.distance_to_frustum(frustum, np.tile(points, (copies, 1)), want=("witness",))
+    once = gs.distance_to_frustum(frustum, points, want=("witness",))
+    large = {name: getattr(answer, name) for name in ("distance", "lower", "upper", "region", "point_a")}
+    assert large["distance"].nbytes > 4 << 20
+    del answer
+    for name, values in large.items():
+        expected = getattr(once, name)
+        assert values.dtype == expected.dtype and values.flags.c_contiguous and values.flags.writeable
+        assert (values.reshape(copies, *expected.shape) == expected).all(), name
+
+
 def test_both_arithmetics_agree(rng):
     """Points whose squares leave the range of double are measured in long double, in the same batch."""
     frustum = gs.Frustum([0, 0, 0], np.eye(3), bounds=(0.0, 1.0, -1.0, 1.0), near=1.0, far=4.0)

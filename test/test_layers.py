@@ -51,8 +51,13 @@ OPTIONAL = {
 
 # The C++ includes: its own directories by their path from src, the standard library by names without a dot.
 CPP_LAYERS = {
+<<<<<<< HEAD
     "src/bind/*": ("bind/*", "geom/*", "nanobind/*"),
     "src/geom/*": ("geom/*", "boost/multiprecision/cpp_int.hpp"),
+=======
+    "src/bind/*": ("bind/*", "geom/*", "nanobind/*", "sys/mman.h"),
+    "src/geom/*": ("geom/*",),
+>>>>>>> speed
 }
 VECTOR_INTRINSICS = ("immintrin.h",)
 INPUT_OUTPUT = ("cstdio", "fstream", "filesystem", "iostream", "istream", "ostream", "print", "syncstream")

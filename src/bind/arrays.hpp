@@ -5,11 +5,15 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <sys/mman.h>
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <functional>
 #include <initializer_list>
-#include <memory>
+#include <new>
+#include <numeric>
 
 namespace geomsrv::bind {
 
@@ -37,11 +41,33 @@ struct Output {
     T* data = nullptr;
 };
 
-/// numpy.empty: large results get huge pages from numpy's allocator, which halves the page faults of a big
-/// batch.
+/// Pages of this size are asked for where a result fills two of them.
+inline constexpr std::size_t kHugePage = std::size_t{1} << 21;
+
+/// Memory in whole huge pages.  The first write to a page costs a fault: with small pages, of which numpy's
+/// allocator leaves some at both ends of an array, that takes longer than most kernels do.
+inline void* huge_pages(std::size_t bytes) {
+    const std::size_t size = (bytes + kHugePage - 1) / kHugePage * kHugePage;
+    void* const memory = std::aligned_alloc(kHugePage, size);
+    if (memory == nullptr) throw std::bad_alloc();
+#ifdef MADV_HUGEPAGE
+    ::madvise(memory, size, MADV_HUGEPAGE);  // a wish: where it is not granted, small pages serve
+#endif
+    return memory;
+}
+
+/// An array to be filled.
 template <class T>
 Output<T> empty(std::initializer_list<std::size_t> shape) {
     static_assert(sizeof(T) == 1 || sizeof(T) == 8);
+    const std::size_t bytes =
+        std::accumulate(shape.begin(), shape.end(), sizeof(T), std::multiplies<std::size_t>());
+    if (bytes >= 2 * kHugePage) {
+        void* const memory = huge_pages(bytes);
+        const nb::capsule owner(memory, [](void* p) noexcept { std::free(p); });
+        const nb::ndarray<nb::numpy, T, nb::c_contig> array(memory, shape.size(), shape.begin(), owner);
+        return {nb::cast(array), static_cast<T*>(memory)};
+    }
     const char* dtype = std::is_same_v<T, double>         ? "float64"
                         : std::is_same_v<T, std::int64_t> ? "int64"
                         : std::is_same_v<T, bool>         ? "bool"

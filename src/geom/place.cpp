@@ -67,21 +67,49 @@ Rounded relative(Vec3 m, const Transform& X_ls, const LocalFrame& frame, bool tu
     return relative_wide(m, X_ls, frame, turned);
 }
 
+/// Whether R n = m and R^T m = n without rounding, where m is R n rounded: every entry that meets a number
+/// other than 0 on either way is 0 or +-1, and as the rows and columns are of length 1 and perpendicular but
+/// for rounding, such numbers are only moved and negated.
+bool only_permutes(const Mat3& r, Vec3 n, Vec3 m) {
+    const auto whole = [](double x) { return x == 0.0 || std::abs(x) == 1.0; };
+    const auto row_fits = [&](Vec3 row, double out) {
+        return (whole(row.x) || (n.x == 0.0 && out == 0.0)) && (whole(row.y) || (n.y == 0.0 && out == 0.0)) &&
+               (whole(row.z) || (n.z == 0.0 && out == 0.0));
+    };
+    return row_fits(r.row[0], m.x) && row_fits(r.row[1], m.y) && row_fits(r.row[2], m.z);
+}
+
+// How far the normal of a turned half space may be off before it is rounded to doubles.  With G = R^T R the
+// normal is R G^-1 n; `turned_normal` finds R (2 - G) n, which is off by (G - 1)^2.  |G - 1| <= 256 u is
+// twice the stretch of a matrix made from a product of two unit quaternions, which are each off by 3 u: their
+// product by 14 u, its matrix by 4 * 14 + 11 = 67 u, rounded up.  A second (256 u)^2 pays for the roundings
+// of the correction, a few u of at most 256 u.
+constexpr double kInverseError = 2 * (256 * kUnitRoundoff) * (256 * kUnitRoundoff);
+
+/// Normal of the half space that R, taken literally, makes of one with normal n: not R n but the solution m
+/// of R^T m = n, since m . R x = n . x.  R^-1 is R^T up to rounding only, and what that is to the result is
+/// felt at the distance of the origins.
+WideVec3 turned_normal(const Mat3& r, Vec3 n) {
+    const WideVec3 own = widen(n);
+    const WideVec3 first = {dot(own, r.row[0]), dot(own, r.row[1]), dot(own, r.row[2])};
+    if (only_permutes(r, n, narrow(first))) return first;
+    const WideVec3 back = {dot(first, column(r, 0)), dot(first, column(r, 1)), dot(first, column(r, 2))};
+    return first + widen(r * narrow(own - back));
+}
+
 PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame) {
-    const WideVec3 own = widen({shape.params[0], shape.params[1], shape.params[2]});
-    const auto row = [&](int i) { return dot(own, X_ls.rotation.row[i]); };
-    const WideVec3 turned = {row(0), row(1), row(2)};
+    const Vec3 own = {shape.params[0], shape.params[1], shape.params[2]};
+    const WideVec3 turned = turned_normal(X_ls.rotation, own);
+    const bool exact = only_permutes(X_ls.rotation, own, narrow(turned));
     const Rounded normal = rounded(turned, 0.0);
     // normal . (x - t) <= offset becomes normal . local <= offset + normal . (t - origin).
     const WideVec3 shift = exact_difference(frame.scale * X_ls.translation, frame.scale * frame.origin);
     const double own_offset = frame.scale * shape.params[3];
     const DoubleDouble offset = DoubleDouble{own_offset, 0.0} + dot(turned, shift);
     const double size = std::abs(own_offset) + safe_norm(narrow(shift));
-    // Numbers whose sum fits in two doubles have been added exactly: a low part of 0 says that nothing was
-    // rounded.
-    const double lost = offset.lo == 0.0 && normal.error == 0.0 ? 0.0 : 8 * kWideRoundoff * size;
-    const double normal_lost = normal.error == 0.0 ? 0.0 : 8 * kWideRoundoff;
-    return {normal.value, offset.hi, normal.error + normal_lost, std::abs(offset.lo) + lost};
+    const double wide_error = 8 * kWideRoundoff + (exact ? 0.0 : kInverseError);
+    return {normal.value, offset.hi, exact ? 0.0 : normal.error + wide_error,
+            std::abs(offset.lo) + wide_error * size};
 }
 
 void place_hull(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch,

@@ -34,13 +34,40 @@ Transform relative_pose(const double* a, const Mat3& rotation_a, const double* b
 }
 
 /// How far from the origins the rounding of a rotation is felt: r_a + r_b + |p_ab|.  Of a half space, what
-/// counts is where the other body is and how far off the boundary lies.
+/// counts is where the other body is and how far off the boundary lies.  One of them at most is unbounded.
 double arm(const PlacedShape& a, const PlacedShape& b, double apart) {
     const auto bounded = [apart](const PlacedShape& shape, double other) {
-        const bool fits = std::isinf(shape.reach) && std::isfinite(other);
-        return fits ? apart + other + std::fabs(shape.shape.params[3]) : shape.reach;
+        return std::isinf(shape.reach) ? apart + other + std::fabs(shape.shape.params[3]) : shape.reach;
     };
     return bounded(a, b.reach) + bounded(b, a.reach) + apart;
+}
+
+bool is_half_space(const PlacedShape& shape) { return shape.shape.kind == ShapeKind::half_space; }
+
+// Half spaces are known to lean if they do by more than this times the pose rounding: that turns one against
+// the other by two of it (both reaches 1), and the normals and their product err by less than one more.
+constexpr double kLean = 4.0;
+
+// A gap between planes, in terms of the pose rounding times the distance of the origins and both offsets: the
+// lean that is not known costs kLean, the pose one, and the plane's own product less than another.
+constexpr double kPlaneGap = kLean + 2.0;
+
+/// Two half spaces whose relative rotation was rounded.  Unless it is certain that they lean, and then share
+/// an unbounded part, all that is known is that they are no farther apart than parallel planes would be.
+void widen_half_spaces(Separation& s, const PlacedShape& a, const PlacedShape& b, const Transform& X_ab,
+                       double pose_rounding) {
+    const double* const own = a.shape.params;
+    const double* const other = b.shape.params;
+    const Vec3 p = X_ab.translation;
+    const Vec3 n{own[0], own[1], own[2]};
+    const Vec3 m = X_ab.rotation * Vec3{other[0], other[1], other[2]};
+    if (dot(n, m) >= 0.0 || norm(cross(n, m)) > kLean * pose_rounding) return;
+    const double apart = std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z);
+    const double size = std::fabs(own[3]) + std::fabs(other[3]) + apart;
+    const double gap = -own[3] - other[3] - dot(m, p);
+    const double most = gap + (kPlaneGap * pose_rounding * size + kUnderflow);
+    s.lower = -kInfinity;
+    s.upper = std::isnan(most) ? kInfinity : std::fmax(s.upper, most);
 }
 
 }  // namespace
@@ -56,7 +83,10 @@ Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double po
     // Bodies at round numbers of metres lose nothing, and neither do bodies that are not turned; their
     // interval shows it.
     double slack = a.uncertainty + b.uncertainty;
-    if (!(unrotated(a.pose) && unrotated(b.pose))) {
+    const bool turned = !(unrotated(a.pose) && unrotated(b.pose));
+    if (turned && is_half_space(a) && is_half_space(b)) {
+        widen_half_spaces(s, a, b, X_ab, pose_rounding);
+    } else if (turned) {
         const Vec3 p = X_ab.translation;
         slack += pose_rounding * arm(a, b, std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z)) + kUnderflow;
     }

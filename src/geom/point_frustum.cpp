@@ -153,8 +153,8 @@ DistanceFrame<Number, Sides> distance_frame(const View<Sides>& given) {
     return frame;
 }
 
-// Depths and windows in these ranges, and slopes (window over near) up to kLargestSlope, keep what is formed of
-// them in the normal range of double: squares of slopes (2^400), and lengths times slopes (2^700).
+// Depths and windows in these ranges, and slopes (window over near) up to kLargestSlope, keep what is formed
+// of them in the normal range of double: squares of slopes (2^400), and lengths times slopes (2^700).
 constexpr double kSmallestDepth = 0x1p-400;
 constexpr double kLargestDepth = 0x1p500;
 constexpr double kLargestWindow = 0x1p400;
