@@ -10,6 +10,7 @@ namespace geomsrv::bind {
 void define_validate(nanobind::module_& m);
 void define_frustum(nanobind::module_& m);
 void define_polygons(nanobind::module_& m);
+void define_polytopes(nanobind::module_& m);
 void define_distance(nanobind::module_& m);
 void define_broad_phase(nanobind::module_& m);
 
