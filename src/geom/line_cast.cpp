@@ -66,15 +66,9 @@ GEOMSRV_INLINE int top_of_points(const Core& core, Vec3 n) {
     const LaneMask better = best < other_best;
     best = select(better, other_best, best);
     where = select(better, other_where, where);
-    double top = best[0];
-    double found = where[0];
-    for (int lane = 1; lane < kLanes; ++lane) {
-        if (best[lane] > top || (best[lane] == top && where[lane] < found)) {
-            top = best[lane];
-            found = where[lane];
-        }
-    }
-    return static_cast<int>(found);
+    // Of equals, the first.
+    const Lanes none = static_cast<double>(core.count);
+    return static_cast<int>(least(select(best < Lanes(greatest(best)), none, where)));
 }
 
 GEOMSRV_INLINE int top_of(const Core& core, Vec3 n) {
@@ -228,45 +222,40 @@ private:
     /// To the facet where the line enters (side 1) or leaves K (-1); false if it got stuck, or if one of the corners
     /// may be on the wrong side of the line.
     GEOMSRV_INLINE bool descend(const Triangle& start, double side, Portal& out) const {
-        Corner c0 = start.corner[0];
-        Corner c1 = start.corner[1];
-        Corner c2 = start.corner[2];
+        Corner c[3] = {start.corner[0], start.corner[1], start.corner[2]};
         bool settled = false;
         Vec3 n;
-        Corner low = c0;
+        Corner low = c[0];
         for (int step = 0; step < kMostSteps; ++step) {
             // Counter-clockwise about w: the product is along w, on the side where the line leaves.
-            n = -side * cross(c1.v - c0.v, c2.v - c0.v);
+            n = -side * cross(c[1].v - c[0].v, c[2].v - c[0].v);
             const double size = std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z);
             low = lowest(n);
-            if (!(dot(n, low.v - c0.v) < -kSettled * reach_ * size)) {
+            if (!(dot(n, low.v - c[0].v) < -kSettled * reach_ * size)) {
                 settled = size > 0.0;
                 break;
             }
-            const double s0 = cross(low.flat, c0.flat);
-            const double s1 = cross(low.flat, c1.flat);
-            const double s2 = cross(low.flat, c2.flat);
-            if (s0 >= 0.0 && s1 < 0.0) {
-                c2 = low;
-            } else if (s1 >= 0.0 && s2 < 0.0) {
-                c0 = low;
-            } else if (s2 >= 0.0 && s0 < 0.0) {
-                c1 = low;
-            } else {
+            // The line is between two corners and what is opposite to the new one; it replaces the third.  Which
+            // one that is cannot be predicted, so it is not a branch.
+            const bool left0 = cross(low.flat, c[0].flat) >= 0.0;
+            const bool left1 = cross(low.flat, c[1].flat) >= 0.0;
+            const bool left2 = cross(low.flat, c[2].flat) >= 0.0;
+            if (left0 == left1 && left1 == left2) {
                 break;
             }
+            c[left0 & !left1 ? 2 : left1 & !left2 ? 0 : 1] = low;
         }
-        out.corner[0] = c0.id;
-        out.corner[1] = c1.id;
-        out.corner[2] = c2.id;
+        out.corner[0] = c[0].id;
+        out.corner[1] = c[1].id;
+        out.corner[2] = c[2].id;
         const double length = norm(n);
         if (!settled || !(length > 0.0)) {
             return false;
         }
         out.normal = {n.x / length, n.y / length, n.z / length};
-        const double h0 = dot(out.normal, c0.v);
-        const double h1 = dot(out.normal, c1.v);
-        const double h2 = dot(out.normal, c2.v);
+        const double h0 = dot(out.normal, c[0].v);
+        const double h1 = dot(out.normal, c[1].v);
+        const double h2 = dot(out.normal, c[2].v);
         const double errors = a_.error + b_.error;
         out.height = std::min({h0, h1, h2, dot(out.normal, low.v)});
         out.lowest = out.height - (kLowestError * reach_ + errors);
@@ -275,8 +264,8 @@ private:
         out.rate_error = kPortalRateError * norm(w_);
         // The line passes between the corners for certain.
         const double doubt = kAreaError * reach_ * reach_ + 4.0 * errors * reach_;
-        return cross(c0.flat, c1.flat) > doubt && cross(c1.flat, c2.flat) > doubt &&
-               cross(c2.flat, c0.flat) > doubt && side * out.rate > out.rate_error;
+        return cross(c[0].flat, c[1].flat) > doubt && cross(c[1].flat, c[2].flat) > doubt &&
+               cross(c[2].flat, c[0].flat) > doubt && side * out.rate > out.rate_error;
     }
 
     const Core& a_;

@@ -38,19 +38,6 @@ constexpr double kRoundedUp = 1.0 + 16 * kUnitRoundoff;
 
 std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
-/// Least and largest of a padded row.
-GEOMSRV_INLINE void extremes(const double* x, std::size_t count, double& low, double& high) {
-    Lanes lowest = Lanes::load(x);
-    Lanes highest = lowest;
-    for (std::size_t i = kLanes; i < count; i += kLanes) {
-        const Lanes at = Lanes::load(x + i);
-        lowest = lesser(lowest, at);
-        highest = greater(highest, at);
-    }
-    low = least(lowest);
-    high = greatest(highest);
-}
-
 /// Middle of the bounding box and half its diagonal; the rows are then relative to the middle.
 struct Extent {
     Vec3 middle;
@@ -58,31 +45,55 @@ struct Extent {
     double largest = 0.0;
 };
 
+/// Four points x y z, one after the other, by coordinates.
+GEOMSRV_INLINE void load_points(const double* p, Lanes (&row)[3]) {
+    using Index = LaneMask::Vector;
+    const auto v0 = Lanes::load(p).v;      // x0 y0 z0 x1
+    const auto v1 = Lanes::load(p + 4).v;  // y1 z1 x2 y2
+    const auto v2 = Lanes::load(p + 8).v;  // z2 x3 y3 z3
+    row[0].v = __builtin_shuffle(__builtin_shuffle(v0, v1, Index{0, 3, 6, 0}), v2, Index{0, 1, 2, 5});
+    row[1].v = __builtin_shuffle(__builtin_shuffle(v0, v1, Index{1, 4, 7, 0}), v2, Index{0, 1, 2, 6});
+    row[2].v = __builtin_shuffle(__builtin_shuffle(v0, v1, Index{2, 5, 0, 0}), v2, Index{0, 1, 4, 7});
+}
+
 GEOMSRV_WIDE_CLONES Extent load_hull(const ExactBody& body, double scale, double* rows) {
     const auto listed = static_cast<std::size_t>(body.listed);
     const std::size_t count = padded(listed);
-    double* const row[3] = {rows, rows + count, rows + 2 * count};
     const double* const given = body.points;
-    for (std::size_t i = 0; i < count; ++i) {
-        const double* const p = given + 3 * std::min(i, listed - 1);
-        row[0][i] = scale * p[0];
-        row[1][i] = scale * p[1];
-        row[2][i] = scale * p[2];
+    Lanes low[3];
+    Lanes high[3];
+    for (std::size_t i = 0; i < count; i += kLanes) {
+        Lanes at[3];
+        if (i + kLanes <= listed) {
+            load_points(given + 3 * i, at);
+        } else {
+            double last[3 * kLanes];
+            for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                std::copy_n(given + 3 * std::min(i + lane, listed - 1), 3, last + 3 * lane);
+            }
+            load_points(last, at);
+        }
+        for (int k = 0; k < 3; ++k) {
+            at[k] = Lanes(scale) * at[k];
+            at[k].store(rows + static_cast<std::size_t>(k) * count + i);
+            low[k] = i == 0 ? at[k] : lesser(low[k], at[k]);
+            high[k] = i == 0 ? at[k] : greater(high[k], at[k]);
+        }
     }
     double middle[3];
     double half[3];
     Extent out;
     for (int k = 0; k < 3; ++k) {
-        double low = 0.0;
-        double high = 0.0;
-        extremes(row[k], count, low, high);
+        const double lowest = least(low[k]);
+        const double highest = greatest(high[k]);
         // Halves first: the sum of two large coordinates must not overflow.
-        middle[k] = 0.5 * low + 0.5 * high;
-        half[k] = std::max(high - middle[k], middle[k] - low);
-        out.largest = std::max({out.largest, std::fabs(low), std::fabs(high)});
+        middle[k] = 0.5 * lowest + 0.5 * highest;
+        half[k] = std::max(highest - middle[k], middle[k] - lowest);
+        out.largest = std::max({out.largest, std::fabs(lowest), std::fabs(highest)});
         const Lanes m = middle[k];
+        double* const row = rows + static_cast<std::size_t>(k) * count;
         for (std::size_t i = 0; i < count; i += kLanes) {
-            (Lanes::load(row[k] + i) - m).store(row[k] + i);
+            (Lanes::load(row + i) - m).store(row + i);
         }
     }
     out.middle = {middle[0], middle[1], middle[2]};
