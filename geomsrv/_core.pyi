@@ -11,6 +11,9 @@ _U = NDArray[np.uint8]
 _B = NDArray[np.bool_]
 # distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
 _Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
+# status, time, time_lower, time_upper, last_time (n,), normal (n, 3), points (k, 3), point_offsets (n + 1,), certain,
+# closing_speed (n,), items answered by the filter, in double-double, exactly
+_Contacts = tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _F, tuple[int, int, int]]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
 
@@ -29,6 +32,54 @@ def first_contact_polygons(
     t_max: float,
     contact_set: bool,
 ) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I]: ...
+def first_contact_boxes(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
+    center_b: _F,
+    axes_b: _F,
+    half_extents_b: _F,
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+    accuracy: str,
+) -> _Contacts: ...
+def first_contact_boxes_polytopes(
+    center_a: _F,
+    axes_a: _F,
+    half_extents_a: _F,
+    vertices_b: _F,
+    offsets_b: _I,
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+    accuracy: str,
+) -> _Contacts: ...
+def first_contact_polytopes_boxes(
+    vertices_a: _F,
+    offsets_a: _I,
+    center_b: _F,
+    axes_b: _F,
+    half_extents_b: _F,
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+    accuracy: str,
+) -> _Contacts: ...
+def first_contact_polytopes(
+    vertices_a: _F,
+    offsets_a: _I,
+    vertices_b: _F,
+    offsets_b: _I,
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+    accuracy: str,
+) -> _Contacts: ...
 def distance_polygons(
     vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool
 ) -> _Distances: ...

@@ -19,7 +19,6 @@ from geomsrv import _core
 from geomsrv.errors import GeometryError, NotAvailableError
 
 ACCURACIES = ("bound", "float32", "float64", "exact")  #: every tier, cheapest first
-AVAILABLE_ACCURACIES = ("float64",)  #: the tiers this version answers
 
 # A rotation is refused if a row's length or the angle between two rows is off by more than this: beyond it
 # the caller has passed something else (a scaled matrix, a transposed block), not a rotation that drifted.
@@ -189,12 +188,13 @@ def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def accuracy(value: Any) -> str:
-    """A tier this version answers."""
+def accuracy(value: Any, available: tuple[str, ...] = ("float64",)) -> str:
+    """A tier that the query answers."""
     if not isinstance(value, str) or value not in ACCURACIES:
         raise GeometryError(f"accuracy must be one of {', '.join(ACCURACIES)}, got {value!r}")
-    if value not in AVAILABLE_ACCURACIES:
-        raise NotAvailableError(f"accuracy={value!r} is not available yet; this version answers 'float64'")
+    if value not in available:
+        answered = ", ".join(map(repr, available))
+        raise NotAvailableError(f"accuracy={value!r} is not available yet; this query answers {answered}")
     return value
 
 

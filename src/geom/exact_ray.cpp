@@ -7,6 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "geom/exact_direction.hpp"
+
 namespace geomsrv {
 
 namespace {
@@ -41,25 +43,6 @@ VectorOf<N> step(const ExactBody& body, int from, int to) {
 template <class N>
 bool is_zero(const VectorOf<N>& v) {
     return sign_of(v.x) == 0 && sign_of(v.y) == 0 && sign_of(v.z) == 0;
-}
-
-/// Entries are off by at most 2 u of the largest; false if that is not known.
-bool round_direction(const VectorOf<Enclosed>& v, Vec3& out) {
-    out = {v.x.value.hi, v.y.value.hi, v.z.value.hi};
-    const double size = std::max({std::fabs(out.x), std::fabs(out.y), std::fabs(out.z)});
-    const double error = std::max({v.x.error, v.y.error, v.z.error});
-    return error <= kUnitRoundoff * size && size > 0x1p-400 && size < 0x1p400;
-}
-bool round_direction(const VectorOf<Exact>& v, Vec3& out) {
-    Exact size = v.x.magnitude();
-    for (const Exact* other : {&v.y, &v.z}) {
-        if (size < other->magnitude()) {
-            size = other->magnitude();
-        }
-    }
-    out = {rounded_quotient(v.x, size).nearest, rounded_quotient(v.y, size).nearest,
-           rounded_quotient(v.z, size).nearest};
-    return true;
 }
 
 /// Vertices of a body that are level along a direction because the corners of K listed say so: those that share a

@@ -128,10 +128,11 @@ struct Triangle {
     Corner corner[3];
 };
 
+template <bool kWide>
 class Cast {
 public:
-    GEOMSRV_INLINE Cast(const Core& a, const Core& b, Vec3 w)
-        : a_(a), b_(b), w_(w), across_(w), reach_(a.reach + b.reach) {}
+    GEOMSRV_INLINE Cast(const Core& a, const Core& b, Vec3 w, double margin)
+        : a_(a), b_(b), w_(w), across_(w), reach_(a.reach + b.reach), margin_(margin) {}
 
     GEOMSRV_INLINE LineCast run() const {
         LineCast out;
@@ -140,7 +141,9 @@ public:
             return out;
         }
         out.portals = true;
-        if (descend(around, 1.0, out.enter) && descend(around, -1.0, out.leave)) {
+        descend(around, 1.0, out.enter);
+        descend(around, -1.0, out.leave);
+        if (out.enter.sure && out.leave.sure) {
             out.outcome = LineCast::Outcome::meets;
         }
         return out;
@@ -151,7 +154,10 @@ private:
     GEOMSRV_INLINE Corner lowest(Vec3 n) const {
         const int p = top_of(a_, n);
         const int q = top_of(b_, -n);
-        const Vec3 v = vertex_of(b_, q) - vertex_of(a_, p);
+        Vec3 v = vertex_of(b_, q) - vertex_of(a_, p);
+        if constexpr (kWide) {
+            v = v - Vec3{std::copysign(margin_, n.x), std::copysign(margin_, n.y), std::copysign(margin_, n.z)};
+        }
         return {{p, q}, v, across_(v)};
     }
 
@@ -219,9 +225,8 @@ private:
         return true;
     }
 
-    /// To the facet where the line enters (side 1) or leaves K (-1); false if it got stuck, or if one of the corners
-    /// may be on the wrong side of the line.
-    GEOMSRV_INLINE bool descend(const Triangle& start, double side, Portal& out) const {
+    /// To the facet where the line enters (side 1) or leaves K (-1).
+    GEOMSRV_INLINE void descend(const Triangle& start, double side, Portal& out) const {
         Corner c[3] = {start.corner[0], start.corner[1], start.corner[2]};
         bool settled = false;
         Vec3 n;
@@ -250,7 +255,7 @@ private:
         out.corner[2] = c[2].id;
         const double length = norm(n);
         if (!settled || !(length > 0.0)) {
-            return false;
+            return;
         }
         out.normal = {n.x / length, n.y / length, n.z / length};
         const double h0 = dot(out.normal, c[0].v);
@@ -264,8 +269,9 @@ private:
         out.rate_error = kPortalRateError * norm(w_);
         // The line passes between the corners for certain.
         const double doubt = kAreaError * reach_ * reach_ + 4.0 * errors * reach_;
-        return cross(c[0].flat, c[1].flat) > doubt && cross(c[1].flat, c[2].flat) > doubt &&
-               cross(c[2].flat, c[0].flat) > doubt && side * out.rate > out.rate_error;
+        out.settled = true;
+        out.sure = cross(c[0].flat, c[1].flat) > doubt && cross(c[1].flat, c[2].flat) > doubt &&
+                   cross(c[2].flat, c[0].flat) > doubt && side * out.rate > out.rate_error;
     }
 
     const Core& a_;
@@ -273,10 +279,17 @@ private:
     Vec3 w_;
     Across across_;
     double reach_;
+    double margin_;
 };
 
 }  // namespace
 
-GEOMSRV_WIDE_CLONES LineCast cast_line(const Core& a, const Core& b, Vec3 w) { return Cast(a, b, w).run(); }
+GEOMSRV_WIDE_CLONES LineCast cast_line(const Core& a, const Core& b, Vec3 w) {
+    return Cast<false>(a, b, w, 0.0).run();
+}
+
+LineCast cast_line_wide(const Core& a, const Core& b, Vec3 w, double margin) {
+    return Cast<true>(a, b, w, margin).run();
+}
 
 }  // namespace geomsrv

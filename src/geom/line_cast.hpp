@@ -35,6 +35,8 @@ struct Portal {
     double height = 0.0;   ///< about the lowest
     double rate = 0.0;     ///< -w . normal: > 0 where the line enters, < 0 where it leaves
     double rate_error = 0.0;
+    bool settled = false;  ///< the plane supports K up to rounding
+    bool sure = false;     ///< and the line passes between the corners, for certain
 };
 
 struct LineCast {
@@ -54,6 +56,9 @@ struct LineCast {
 
 /// The line of all t (-w); rows of hulls are padded to whole lanes.
 LineCast cast_line(const Core& a, const Core& b, Vec3 w);
+
+/// The same for K and all within a cube of that half size about each of its points.
+LineCast cast_line_wide(const Core& a, const Core& b, Vec3 w, double margin);
 
 // Error of the height n . v of a vertex v of K along a unit vector, in terms of the reach of the pair: each end
 // is rounded (kVertexError, and the core's own u), their difference by 2 u, the product by 3 u.

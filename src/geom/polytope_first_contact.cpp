@@ -1,40 +1,236 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
+// A pair is first cast in float64 (line_cast.hpp).  Where that proves its answer, and nothing is within the slack for
+// the rounding of the *input*, that is it.  Everything else is solved exactly (exact_ray.hpp); then the slack decides.
+//
+// Exact contact is the one case that float64 data hardly ever represent: of two bodies that touch, rotated copies
+// overlap or miss by a rounding error.  Therefore bodies that come within the slack count as touching, facets along
+// which they slide within it do not set the time, and overlaps less deep are none.  Apart from that, times and their
+// bounds are those of the given numbers taken literally.
 #include "geom/polytope_first_contact.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "geom/convex_convex.hpp"
+#include "geom/exact_direction.hpp"
 #include "geom/exact_ray.hpp"
 #include "geom/line_cast.hpp"
+#include "geom/rounding.hpp"
 
 namespace geomsrv {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// What float64 decides about a time is good to this relative error, or it is found exactly: some hundred times what
+// rounding leaves of numbers in which nothing cancels.
+constexpr double kSharp = 0x1p-44;
+
+// What a margin adds must be seen in spite of rounding: this part of the reach is some ten times what a cast rounds.
+constexpr double kLeastMargin = 256 * kUnitRoundoff;
+
+// The margin grows by this until no facet that the line slides along is left, or until it is out of proportion.
+constexpr double kMarginGrowth = 4.0;
+constexpr int kMostMargins = 12;
 
 PolytopeContact never(bool certain, Rung rung) {
     return {ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN, kNaN}, kNaN, {}, certain, rung};
 }
 
-/// Certainly apart at the start, by more than `margin`, and not in contact later.
-bool surely_never(const MovingPair& pair, const LineCast& cast, double t_max, double margin) {
+/// Certainly apart at the start, by more than the slack, and not in contact later.
+bool surely_never(const MovingPair& pair, const LineCast& cast, double t_max, double slack) {
     if (cast.outcome == LineCast::Outcome::misses) {
-        return cast.gap > margin;
+        return cast.gap > slack;
     }
     if (cast.outcome != LineCast::Outcome::meets) {
         return false;
     }
     const Portal& enter = cast.enter;
-    const Portal& leave = cast.leave;
     const double window = pair.seconds().inverse(t_max);
-    return leave.lowest > margin || enter.lowest - margin > (enter.rate + enter.rate_error) * window;
+    return cast.leave.lowest > slack || enter.lowest - slack > (enter.rate + enter.rate_error) * window;
 }
 
-int listed(const MovingBody& body, int vertex) { return std::min(vertex, body.body.count() - 1); }
+double closing_speed(const MovingPair& pair, Vec3 normal) {
+    return -dot(normal, pair.given_b().velocity - pair.given_a().velocity);
+}
+
+/// The answer for the given numbers, without normal and points.
+PolytopeContact literal_contact(const MovingPair& pair, ExactRay& ray, const LineCast& cast, double t_max) {
+    if (!ray.meets(cast)) {
+        return never(true, ray.rung());
+    }
+    const int leave = ray.compare(RayEnd::leave, 0.0);
+    if (leave < 0) {
+        return never(true, ray.rung());
+    }
+    const int enter = ray.compare(RayEnd::enter, 0.0);
+    if (enter > 0 && (pair.at_rest() || (t_max < kInfinity && ray.compare(RayEnd::enter, t_max) > 0))) {
+        return never(true, ray.rung());
+    }
+    PolytopeContact out = never(true, ray.rung());
+    const bool deep = enter < 0 && leave > 0 && ray.inside();
+    out.status = enter > 0 ? ContactStatus::will_touch
+                 : deep    ? ContactStatus::overlapping
+                           : ContactStatus::touching;
+    const Rounding time = enter > 0 ? ray.time(RayEnd::enter) : Rounding{};
+    out.time = time.nearest;
+    out.time_lower = time.lower;
+    out.time_upper = time.upper;
+    const double last = pair.at_rest() ? kInfinity : ray.time(RayEnd::leave).nearest;
+    out.last_time = std::max(std::min(last, t_max), out.time);
+    out.rung = ray.rung();
+    return out;
+}
+
+/// Depth to which the origin is inside the hull of the corners where the line enters and the point where it leaves.
+double depth_between(const MovingPair& pair, const Portal& enter, const Portal& leave) {
+    const auto vertex = [&](VertexPair c) { return vertex_of(pair.b(), c.b) - vertex_of(pair.a(), c.a); };
+    const Vec3 end = -(leave.height / leave.rate) * pair.velocity();
+    double depth = -enter.highest;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 p = vertex(enter.corner[k]);
+        const Vec3 n = cross(vertex(enter.corner[(k + 1) % 3]) - p, end - p);
+        depth = std::min(depth, std::fabs(dot(n, p)) / norm(n));
+    }
+    return depth;
+}
+
+/// What a cast proves on its own; nothing where the slack or rounding leaves a doubt.
+std::optional<PolytopeContact> plain_contact(const MovingPair& pair, const LineCast& cast, double t_max) {
+    if (cast.outcome != LineCast::Outcome::meets || pair.at_rest()) {
+        return {};
+    }
+    const Portal& enter = cast.enter;
+    const Portal& leave = cast.leave;
+    const double slow = kLargestSlack * pair.speed();
+    const double slack = pair.noise();
+    const double last = leave.height / leave.rate;
+    const double last_rate = -leave.rate;
+    const double doubt = (leave.highest - leave.lowest) * last_rate - leave.height * leave.rate_error;
+    if (!(last_rate > slow && leave.highest < 0.0 && doubt <= kSharp * -leave.height * last_rate)) {
+        return {};
+    }
+    PolytopeContact out = never(true, Rung::filter);
+    const Seconds seconds = pair.seconds();
+    out.last_time = std::min(seconds.nearest(last), t_max);
+    if (enter.lowest > slack && enter.rate > slow) {
+        const double lower = next_down(enter.lowest / (enter.rate + enter.rate_error));
+        const double upper = next_up(enter.highest / (enter.rate - enter.rate_error));
+        const bool within = seconds.up(upper) <= std::min(t_max, kLargest);
+        if (!(within && upper - lower <= kSharp * upper && upper * last_rate < -leave.highest)) {
+            return {};
+        }
+        out.status = ContactStatus::will_touch;
+        out.time = seconds.nearest(enter.height / enter.rate);
+        out.time_lower = seconds.down(lower);
+        out.time_upper = seconds.up(upper);
+        out.normal = enter.normal;
+        out.closing_speed = closing_speed(pair, out.normal);
+        return out;
+    }
+    if (enter.highest < 0.0 && depth_between(pair, enter, leave) > slack + kLeastMargin * pair.reach()) {
+        out.status = ContactStatus::overlapping;
+        out.time = out.time_lower = out.time_upper = 0.0;
+        return out;
+    }
+    return {};
+}
+
+/// A facet of K, or what else limits contact along the line.
+struct Limit {
+    double time = 0.0;  ///< of the given numbers, in the units of the pair
+    Vec3 normal;
+    double gap = 0.0;
+    double rate = 0.0;
+    double width = 0.0;  ///< least height of the triangle that the normal is of
+};
+
+/// As far as float64 can tell.
+bool agree(double time, double literal) { return std::fabs(time - literal) <= 8.0 * kSharp * literal; }
+
+/// Contact within the slack.
+class Nearly {
+public:
+    Nearly(const MovingPair& pair) : pair_(pair) {}
+
+    /// Where the line enters or leaves K, apart from facets that it slides along within the slack: with a margin
+    /// about K it is inside of those.
+    std::optional<Limit> limit(RayEnd end, double distance) const {
+        double margin = distance + std::max(2.0 * pair_.noise(), kLeastMargin * pair_.reach());
+        for (int count = 0; count < kMostMargins; ++count, margin *= kMarginGrowth) {
+            const LineCast cast = cast_line_wide(pair_.a(), pair_.b(), pair_.velocity(), margin);
+            const Portal& portal = end == RayEnd::enter ? cast.enter : cast.leave;
+            if (cast.portals && portal.settled) {
+                const Limit found = limit_of(portal, margin);
+                if (!slides(found, end)) {
+                    return found;
+                }
+            }
+        }
+        return {};
+    }
+
+    /// Within the slack the line neither enters nor leaves by this facet.
+    [[nodiscard]] bool slides(const Limit& at, RayEnd end) const {
+        const double reach = pair_.reach();
+        const double turn = std::min(pair_.noise() / at.width, kLargestSlack);
+        const double gap_slack = std::min(pair_.noise() + turn * reach, kLargestSlack * reach) +
+                                 2.0 * kLowestError * reach;
+        const double rate_slack = std::min(pair_.velocity_noise() + turn * pair_.speed(), kLargestSlack * pair_.speed()) +
+                                  kPortalRateError * pair_.speed();
+        const double rate = end == RayEnd::enter ? at.rate : -at.rate;
+        return rate <= rate_slack && (end == RayEnd::enter ? at.gap <= gap_slack : true);
+    }
+
+    /// A facet of K with a margin, of the given numbers.
+    [[nodiscard]] Limit limit_of(const Portal& portal, double margin) const {
+        const Vec3 n = portal.normal;
+        Limit out;
+        out.normal = n;
+        out.gap = portal.height + margin * (std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z));
+        out.rate = portal.rate;
+        out.width = width_of(portal.corner);
+        out.time = out.gap / out.rate;
+        return out;
+    }
+
+    [[nodiscard]] double width_of(const VertexPair (&corner)[3]) const {
+        const auto vertex = [&](VertexPair c) { return vertex_of(pair_.b(), c.b) - vertex_of(pair_.a(), c.a); };
+        const Vec3 e = vertex(corner[1]) - vertex(corner[0]);
+        const Vec3 f = vertex(corner[2]) - vertex(corner[0]);
+        return norm(cross(e, f)) / std::max({norm(e), norm(f), norm(f - e)});
+    }
+
+private:
+    const MovingPair& pair_;
+};
+
+/// b and all it passes until `end`, or until it has surely passed a.
+Core swept(const MovingPair& pair, double end, std::vector<double>& rows) {
+    const Core& b = pair.b();
+    const double enough = 4.0 * pair.reach() / pair.speed();
+    const Vec3 way = std::min(end, enough) * pair.velocity();
+    const int count = b.points != nullptr ? b.count : 1 << b.generators;
+    rows.resize(6 * static_cast<std::size_t>(count));
+    Core out;
+    out.center = b.center + 0.5 * way;
+    out.points = rows.data();
+    out.count = 2 * count;
+    for (int i = 0; i < out.count; ++i) {
+        const Vec3 v = vertex_of(b, i % count) - b.center + (i < count ? -0.5 : 0.5) * way;
+        rows[static_cast<std::size_t>(i)] = v.x;
+        rows[static_cast<std::size_t>(out.count + i)] = v.y;
+        rows[static_cast<std::size_t>(2 * out.count + i)] = v.z;
+    }
+    out.reach = b.reach + norm(way);
+    return out;
+}
 
 }  // namespace
 
@@ -43,7 +239,6 @@ ExactPolytopeContactSolver::ExactPolytopeContactSolver(std::size_t most_a, std::
 PolytopeContact ExactPolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
                                                   bool contact_set) {
     (void)contact_set;
-    (void)listed;
     pair_.load(a, b);
     const LineCast cast = cast_line(pair_.a(), pair_.b(), pair_.velocity());
     if (surely_never(pair_, cast, t_max, 0.0)) {
@@ -52,26 +247,7 @@ PolytopeContact ExactPolytopeContactSolver::solve(const MovingBody& a, const Mov
     const ExactAndRough body_a{a.body, pair_.a()};
     const ExactAndRough body_b{b.body, pair_.b()};
     ExactRay ray(body_a, body_b, a.velocity, b.velocity, pair_.ordinary());
-    if (!ray.meets(cast)) {
-        return never(true, ray.rung());
-    }
-    const int leave = ray.compare(RayEnd::leave, 0.0);
-    const int enter = leave < 0 ? 1 : ray.compare(RayEnd::enter, 0.0);
-    const bool late = enter > 0 && (pair_.at_rest() || (t_max < kInfinity && ray.compare(RayEnd::enter, t_max) > 0));
-    if (leave < 0 || late) {
-        return never(true, ray.rung());
-    }
-    PolytopeContact out = never(true, ray.rung());
-    out.status = enter > 0                            ? ContactStatus::will_touch
-                 : enter < 0 && leave > 0 && ray.inside() ? ContactStatus::overlapping
-                                                      : ContactStatus::touching;
-    const Rounding time = enter > 0 ? ray.time(RayEnd::enter) : Rounding{};
-    out.time = time.nearest;
-    out.time_lower = time.lower;
-    out.time_upper = time.upper;
-    const double last = pair_.at_rest() ? kInfinity : ray.time(RayEnd::leave).nearest;
-    out.last_time = std::max(std::min(last, t_max), out.time);
-    out.rung = ray.rung();
+    PolytopeContact out = literal_contact(pair_, ray, cast, t_max);
     return out;
 }
 
@@ -79,23 +255,133 @@ PolytopeContactSolver::PolytopeContactSolver(std::size_t most_a, std::size_t mos
 
 PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
                                              bool contact_set) {
-    (void)contact_set;
     pair_.load(a, b);
     const LineCast cast = cast_line(pair_.a(), pair_.b(), pair_.velocity());
     if (surely_never(pair_, cast, t_max, pair_.noise())) {
         return never(true, Rung::filter);
     }
-    PolytopeContact out = never(false, Rung::filter);
-    if (cast.outcome != LineCast::Outcome::meets) return out;
-    if (cast.enter.lowest > 0) {
-        out.status = ContactStatus::will_touch;
-        out.time = pair_.seconds().nearest(cast.enter.height / cast.enter.rate);
+    PolytopeContact out;
+    double width = pair_.reach();
+    double moment = 0.0;
+    if (const auto plain = plain_contact(pair_, cast, t_max)) {
+        out = *plain;
+        if (out.status == ContactStatus::will_touch) {
+            moment = cast.enter.height / cast.enter.rate;
+            width = contact_set ? Nearly(pair_).width_of(cast.enter.corner) : width;
+        }
     } else {
-        out.status = ContactStatus::overlapping;
-        out.time = 0.0;
+        out = doubtful_contact(cast, t_max, moment, width);
     }
-    out.certain = true;
-    out.last_time = pair_.seconds().nearest(cast.leave.height / cast.leave.rate);
+    if (!contact_set || out.status == ContactStatus::never) {
+        return out;
+    }
+    const double reach = pair_.reach();
+    const double rounding = 2.0 * kLowestError * reach;
+    if (out.status == ContactStatus::overlapping) {
+        out.points = points_.overlapping(pair_, pair_.noise() + rounding);
+        return out;
+    }
+    // Noise turns the plane by as much as the triangle it is of is narrow, and it shifts the time, hence the place.
+    const double turn = pair_.noise() / width;
+    ContactSlack slack{};
+    slack.height = std::min(2.0 * pair_.noise() + turn * reach, kLargestSlack * reach) + rounding;
+    const double rate = std::fabs(dot(out.normal, pair_.velocity()));
+    const double delay = moment > 0.0 ? (pair_.noise() + rounding) / rate * pair_.speed() : 0.0;
+    slack.place = std::min(2.0 * pair_.noise() + delay, kLargestSlack * reach) + rounding;
+    out.points = points_.touching(pair_, out.normal, moment, slack);
+    return out;
+}
+
+PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, double t_max, double& moment,
+                                                        double& width) {
+    const ExactAndRough body_a{pair_.given_a().body, pair_.a()};
+    const ExactAndRough body_b{pair_.given_b().body, pair_.b()};
+    ExactRay ray(body_a, body_b, pair_.given_a().velocity, pair_.given_b().velocity, pair_.ordinary());
+    const PolytopeContact literal = literal_contact(pair_, ray, cast, t_max);
+    const bool touches = literal.status != ContactStatus::never;
+    PolytopeContact out = literal;
+    const double slack = pair_.noise();
+    const Seconds seconds = pair_.seconds();
+    const double window = pair_.at_rest() ? 0.0 : seconds.inverse(t_max);
+    const CoreSeparation start = convex_convex(pair_.a(), pair_.b(), true);
+    double distance = 0.0;
+    if (!touches) {
+        distance = start.value;
+        if (window > 0.0) {
+            distance = convex_convex(pair_.a(), swept(pair_, window, scratch_), false).value;
+        }
+        if (distance > slack) {
+            return literal;
+        }
+    }
+    out.certain = false;
+    const Nearly nearly(pair_);
+    if (start.value <= slack) {
+        out.status = start.value < -slack ? ContactStatus::overlapping : ContactStatus::touching;
+        out.time = out.time_lower = 0.0;
+        out.time_upper = touches ? literal.time_upper : 0.0;
+        out.normal = out.status == ContactStatus::overlapping ? nan_vector() : start.normal;
+        width = 0x1p-4 * pair_.reach();
+    } else {
+        out.status = ContactStatus::will_touch;
+    }
+    const auto facet = [&](RayEnd end) {
+        // Of the given numbers, if they meet by way of a facet.
+        Limit at;
+        Vec3 n;
+        const bool wide = pair_.ordinary() && round_direction(ray.direction<Enclosed>(end), n);
+        if (!wide) {
+            round_direction(ray.direction<Exact>(end), n);
+        }
+        at.normal = normalized(n);
+        at.gap = lowest(pair_.b(), at.normal).value - highest(pair_.a(), at.normal).value;
+        at.rate = -dot(at.normal, pair_.velocity());
+        at.width = nearly.width_of(ray.feature(end).corner);
+        at.time = at.gap / at.rate;
+        return at;
+    };
+    const auto found = [&](RayEnd end) -> std::optional<Limit> {
+        if (touches && ray.inside()) {
+            const Limit at = facet(end);
+            if (!nearly.slides(at, end)) {
+                return at;
+            }
+        }
+        return nearly.limit(end, std::max(distance, 0.0));
+    };
+    if (out.status == ContactStatus::will_touch) {
+        const std::optional<Limit> enter = found(RayEnd::enter);
+        if (!enter) {
+            return literal;
+        }
+        out.normal = enter->normal;
+        width = enter->width;
+        moment = std::min(std::max(enter->time, 0.0), window);
+        if (touches && agree(seconds.nearest(moment), literal.time)) {
+            moment = std::min(seconds.inverse(literal.time), window);
+        } else {
+            const double doubt = kSharp * moment;
+            out.time = std::min(seconds.nearest(moment), t_max);
+            out.time_lower = std::min(seconds.down(std::max(moment - doubt, 0.0)), out.time);
+            out.time_upper = std::max(std::min(seconds.up(moment + doubt), t_max), out.time);
+            if (touches) {
+                out.time = std::min(out.time, literal.time_upper);
+                out.time_lower = std::min(out.time_lower, literal.time_lower);
+                out.time_upper = std::max(out.time_upper, literal.time_upper);
+            }
+        }
+    }
+    if (pair_.at_rest()) {
+        out.last_time = t_max;
+    } else if (const std::optional<Limit> leave = found(RayEnd::leave)) {
+        const double last = std::min(seconds.nearest(std::max(leave->time, 0.0)), t_max);
+        out.last_time = std::max(touches && agree(last, literal.last_time) ? literal.last_time : last, out.time);
+    } else {
+        out.last_time = touches ? literal.last_time : out.time;
+    }
+    out.closing_speed = out.status == ContactStatus::overlapping ? kNaN : closing_speed(pair_, out.normal);
+    out.certain = out.status == literal.status;
+    out.rung = literal.rung;
     return out;
 }
 

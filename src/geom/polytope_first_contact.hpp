@@ -7,8 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "geom/contact_points.hpp"
 #include "geom/contact_status.hpp"
 #include "geom/exact_gjk.hpp"
+#include "geom/line_cast.hpp"
 #include "geom/moving_pair.hpp"
 #include "geom/vec.hpp"
 
@@ -37,8 +39,11 @@ public:
     PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set);
 
 private:
+    /// Solved exactly, then judged by the slack.
+    PolytopeContact doubtful_contact(const LineCast& cast, double t_max, double& moment, double& width);
+
     MovingPair pair_;
-    std::vector<Vec3> points_;
+    ContactPoints points_;
     std::vector<double> scratch_;
 };
 
