@@ -427,11 +427,37 @@ RayFeature ExactRay::descend_in_wall(VertexPair low, VertexPair high, RayEnd end
     fail();
 }
 
-bool ExactRay::meets(const LineCast& guess) {
+void ExactRay::consider_all() {
     among_a_.resize(static_cast<std::size_t>(a_.exact.count()));
     among_b_.resize(static_cast<std::size_t>(b_.exact.count()));
     std::iota(among_a_.begin(), among_a_.end(), 0);
     std::iota(among_b_.begin(), among_b_.end(), 0);
+}
+
+bool ExactRay::pierces(RayEnd end) {
+    const RayFeature& at = feature(end);
+    return at.dimension == 2 && surrounds({{at.corner[0], at.corner[1], at.corner[2]}});
+}
+
+VertexPair ExactRay::lowest_along(const VectorOf<Exact>& direction, VertexPair start) {
+    consider_all();
+    Vec3 rough;
+    round_direction(direction, rough);
+    return lowest(
+        [&]<class N>() {
+            if constexpr (std::is_same_v<N, Exact>) {
+                return direction;
+            } else {
+                // Entries are at most 1.
+                const auto near = [](double x) { return Enclosed({x, 0.0}, 2 * kUnitRoundoff); };
+                return VectorOf<Enclosed>{near(rough.x), near(rough.y), near(rough.z)};
+            }
+        },
+        &start, 1);
+}
+
+bool ExactRay::meets(const LineCast& guess) {
+    consider_all();
     wall_ = {};
     const auto listed = [&](VertexPair pair) {
         return VertexPair{std::min(pair.a, a_.exact.count() - 1), std::min(pair.b, b_.exact.count() - 1)};

@@ -80,10 +80,21 @@ public:
     template <class N>
     [[nodiscard]] VectorOf<N> ray() const;
     template <class N>
+    [[nodiscard]] VectorOf<N> velocity(int body) const {
+        return exactly<N>(body == 0 ? velocity_a_ : velocity_b_);
+    }
+    template <class N>
     [[nodiscard]] VectorOf<N> corner(VertexPair pair) const;
 
+    [[nodiscard]] bool ordinary() const { return ordinary_; }
+    [[nodiscard]] bool at_rest() const { return at_rest_; }
     [[nodiscard]] const ExactAndRough& a() const { return a_; }
     [[nodiscard]] const ExactAndRough& b() const { return b_; }
+
+    /// Whether the facet at that end is the only one of K there: the line passes strictly between its corners.
+    bool pierces(RayEnd end);
+    /// The vertex of K lowest along a direction; `start` if none is lower.
+    VertexPair lowest_along(const VectorOf<Exact>& direction, VertexPair start);
 
     /// What the signs have taken so far.
     [[nodiscard]] Rung rung() const { return exact_ ? Rung::exact : Rung::wide; }
@@ -136,6 +147,7 @@ private:
                 const VertexPair* level, int count);
     Place enclose(VertexPair start, Triangle& around);
     RayFeature descend(const Triangle& around, RayEnd end);
+    void consider_all();
     bool meets_in_wall(VertexPair level);
     RayFeature descend_in_wall(VertexPair low, VertexPair high, RayEnd end);
     bool surrounds(const Triangle& around);

@@ -16,6 +16,7 @@
 
 #include "geom/convex_convex.hpp"
 #include "geom/exact_direction.hpp"
+#include "geom/exact_normal.hpp"
 #include "geom/exact_ray.hpp"
 #include "geom/line_cast.hpp"
 #include "geom/rounding.hpp"
@@ -148,7 +149,8 @@ struct Limit {
     Vec3 normal;
     double gap = 0.0;
     double rate = 0.0;
-    double width = 0.0;  ///< least height of the triangle that the normal is of
+    double width = 0.0;    ///< least height of the triangle that the normal is of
+    bool literal = false;  ///< it is what limits contact of the given numbers
 };
 
 /// As far as float64 can tell.
@@ -232,13 +234,26 @@ Core swept(const MovingPair& pair, double end, std::vector<double>& rows) {
     return out;
 }
 
+/// Normal and closing speed, correctly rounded.
+void set_normal(ExactRay& ray, RayEnd end, bool at_start, PolytopeContact& out) {
+    const auto speeds = [&]<class N>() { return ray.velocity<N>(0) - ray.velocity<N>(1); };
+    if (ray.ordinary() && ray.inside() && ray.pierces(end)) {
+        const VectorOf<Enclosed> n = ray.direction<Enclosed>(end);
+        if (round_unit(n, out.normal) && round_component(n, speeds.operator()<Enclosed>(), out.closing_speed)) {
+            return;
+        }
+    }
+    const VectorOf<Exact> n = contact_normal(ray, end, at_start);
+    round_unit(n, out.normal);
+    round_component(n, speeds.operator()<Exact>(), out.closing_speed);
+}
+
 }  // namespace
 
 ExactPolytopeContactSolver::ExactPolytopeContactSolver(std::size_t most_a, std::size_t most_b) : pair_(most_a, most_b) {}
 
 PolytopeContact ExactPolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
                                                   bool contact_set) {
-    (void)contact_set;
     pair_.load(a, b);
     const LineCast cast = cast_line(pair_.a(), pair_.b(), pair_.velocity());
     if (surely_never(pair_, cast, t_max, 0.0)) {
@@ -248,6 +263,21 @@ PolytopeContact ExactPolytopeContactSolver::solve(const MovingBody& a, const Mov
     const ExactAndRough body_b{b.body, pair_.b()};
     ExactRay ray(body_a, body_b, a.velocity, b.velocity, pair_.ordinary());
     PolytopeContact out = literal_contact(pair_, ray, cast, t_max);
+    if (out.status == ContactStatus::overlapping) {
+        if (contact_set) {
+            out.points = points_.overlapping(ray);
+        }
+    } else if (out.status != ContactStatus::never) {
+        const bool at_start = out.status == ContactStatus::touching;
+        // Bodies that touch now do so where the line enters, or leaves, or in a wall.
+        const bool enters = !at_start || ray.compare(RayEnd::enter, 0.0) == 0;
+        const RayEnd end = enters || !ray.inside() ? RayEnd::enter : RayEnd::leave;
+        if (contact_set) {
+            out.points = points_.touching(ray, end, at_start);
+        }
+        set_normal(ray, end, at_start, out);
+    }
+    out.rung = ray.rung();
     return out;
 }
 
@@ -342,8 +372,9 @@ PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, do
     };
     const auto found = [&](RayEnd end) -> std::optional<Limit> {
         if (touches && ray.inside()) {
-            const Limit at = facet(end);
+            Limit at = facet(end);
             if (!nearly.slides(at, end)) {
+                at.literal = true;
                 return at;
             }
         }
@@ -357,7 +388,7 @@ PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, do
         out.normal = enter->normal;
         width = enter->width;
         moment = std::min(std::max(enter->time, 0.0), window);
-        if (touches && agree(seconds.nearest(moment), literal.time)) {
+        if (enter->literal || (touches && agree(seconds.nearest(moment), literal.time))) {
             moment = std::min(seconds.inverse(literal.time), window);
         } else {
             const double doubt = kSharp * moment;
@@ -375,7 +406,8 @@ PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, do
         out.last_time = t_max;
     } else if (const std::optional<Limit> leave = found(RayEnd::leave)) {
         const double last = std::min(seconds.nearest(std::max(leave->time, 0.0)), t_max);
-        out.last_time = std::max(touches && agree(last, literal.last_time) ? literal.last_time : last, out.time);
+        const bool exact = leave->literal || (touches && agree(last, literal.last_time));
+        out.last_time = std::max(exact ? literal.last_time : last, out.time);
     } else {
         out.last_time = touches ? literal.last_time : out.time;
     }

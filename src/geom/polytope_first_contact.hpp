@@ -9,6 +9,7 @@
 
 #include "geom/contact_points.hpp"
 #include "geom/contact_status.hpp"
+#include "geom/exact_contact_points.hpp"
 #include "geom/exact_gjk.hpp"
 #include "geom/line_cast.hpp"
 #include "geom/moving_pair.hpp"
@@ -57,7 +58,7 @@ public:
 
 private:
     MovingPair pair_;
-    std::vector<Vec3> points_;
+    ExactContactPoints points_;
 };
 
 }  // namespace geomsrv
