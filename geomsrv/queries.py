@@ -215,7 +215,8 @@ def first_contact(
         answer = _core.first_contact_polygons(
             a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set)
         )
-        speed = -((moving_b - moving_a) * answer[5]).sum(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # velocities may differ by more than the largest double
+            speed = -((moving_b - moving_a) * answer[5]).sum(axis=1)
         cost = Cost(time.perf_counter_ns() - start, tier, {"filter": count})
         return FirstContacts(*answer, np.zeros(count, np.bool_), speed, cost)
     kernel = {

@@ -62,7 +62,7 @@ ATTRIBUTES = {
     "Cull": "state certain cost",
     "Distances": "distance lower upper point_a point_b normal status region cost",
     "Booleans": "value certain status cost",
-    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets cost",
+    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain closing_speed cost",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",
     "SceneUpdate": "add remove clear",
@@ -230,6 +230,7 @@ def compiled_functions() -> dict[str, list[tuple[str, str]]]:
         ((signature, *_),) = function.__nb_signature__
         # "ndarray[dtype=float64, shape=(*, 3), ...]" is no Python; its dtype is all that matters here.
         readable = re.sub(r"ndarray\[dtype=(\w+)[^\]]*\]", r"\1", signature)
+        readable = re.sub(r"\\\d+", "...", readable)  # defaults are numbered
         definition = ast.parse(f"{readable}: ...").body[0]
         assert isinstance(definition, ast.FunctionDef)
         functions[name] = [(a.arg, ast.unparse(a.annotation or ast.Constant(None))) for a in definition.args.args]
@@ -257,7 +258,8 @@ def test_engine_refuses_what_it_would_have_to_copy(name: str) -> None:
     """Another dtype or layout means that the edge was bypassed: a TypeError, never a silent copy."""
     function = getattr(_core, name)
     arrays = array_arguments(function.__nb_signature__[0][0])
-    rest = [0.0 if kind == "float" else True for _, kind in stub_functions()[name] if kind in ("float", "bool")]
+    plain = {"float": 0.0, "bool": True, "str": "float64"}
+    rest = [plain[kind] for _, kind in stub_functions()[name] if kind in plain]
     assert len(arrays) + len(rest) == len(stub_functions()[name])
     for i, array in enumerate(arrays):
         others = [array.astype(np.float32), np.repeat(array, 2, axis=0)[::2]]

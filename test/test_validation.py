@@ -482,9 +482,9 @@ FAULTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: gs.distance_to_frustum(None, CENTERS),
         "frustum must be Frustum or Frustum2D, got NoneType",
     ),
-    "moving boxes": (
-        lambda: gs.first_contact(boxes(), boxes(), (0, 0, 0), (0, 0, 0)),
-        "a must be Polygons or Polytopes, got Boxes",
+    "moving frustum": (
+        lambda: gs.first_contact(frustum(), boxes(), (0, 0, 0), (0, 0, 0)),
+        "a must be Polygons or Polytopes or Boxes, got Frustum",
     ),
     "plane against space": (
         lambda: gs.first_contact(polygons(), polytopes(), (0, 0), (0, 0)),
@@ -553,7 +553,7 @@ QUERIES: dict[str, Callable[..., Any]] = {
 }
 
 
-@pytest.mark.parametrize("query", QUERIES)
+@pytest.mark.parametrize("query", [name for name in QUERIES if not name.startswith("first_contact")])
 def test_tiers_that_are_not_available_are_named(query: str) -> None:
     for tier in ("bound", "float32", "exact"):
         with pytest.raises(NotAvailableError, match=f"^accuracy='{tier}' is not available yet") as caught:
