@@ -20,6 +20,9 @@ constexpr int kMostSteps = 64;
 // are off by less than half of it.
 constexpr double kSettled = 2 * kCornerError;
 
+// Squared sine of an angle below which the product of two edges may have lost most of its digits.
+constexpr double kSliver = 0x1p-20;
+
 // Seen along the line, both coordinates of a vertex are off by 6 u of the reach (each end 3 u, core 1 u, shear and
 // differences 2 u), so an area, a product of two, by four times sqrt(2) as much, and 3 u of its own.
 constexpr double kAreaError = 40 * kUnitRoundoff;
@@ -156,7 +159,7 @@ private:
         const int q = top_of(b_, -n);
         Vec3 v = vertex_of(b_, q) - vertex_of(a_, p);
         if constexpr (kWide) {
-            v = v - Vec3{std::copysign(margin_, n.x), std::copysign(margin_, n.y), std::copysign(margin_, n.z)};
+            v = v + lowest_margin(n, margin_);
         }
         return {{p, q}, v, across_(v)};
     }
@@ -225,6 +228,21 @@ private:
         return true;
     }
 
+    /// Of two long edges of a sliver the product cancels: its two shorter ones are multiplied.
+    GEOMSRV_INLINE static Vec3 normal_of(const Corner (&c)[3]) {
+        const Vec3 e = c[1].v - c[0].v;
+        const Vec3 f = c[2].v - c[0].v;
+        const Vec3 n = cross(e, f);
+        if (dot(n, n) > kSliver * (dot(e, e) * dot(f, f))) [[likely]] {
+            return n;
+        }
+        const Vec3 g = c[2].v - c[1].v;
+        const double ee = dot(e, e);
+        const double ff = dot(f, f);
+        const double gg = dot(g, g);
+        return gg >= ee && gg >= ff ? n : ff >= ee ? cross(e, g) : cross(f, g);
+    }
+
     /// To the facet where the line enters (side 1) or leaves K (-1).
     GEOMSRV_INLINE void descend(const Triangle& start, double side, Portal& out) const {
         Corner c[3] = {start.corner[0], start.corner[1], start.corner[2]};
@@ -233,7 +251,7 @@ private:
         Corner low = c[0];
         for (int step = 0; step < kMostSteps; ++step) {
             // Counter-clockwise about w: the product is along w, on the side where the line leaves.
-            n = -side * cross(c[1].v - c[0].v, c[2].v - c[0].v);
+            n = -side * normal_of(c);
             const double size = std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z);
             low = lowest(n);
             if (!(dot(n, low.v - c[0].v) < -kSettled * reach_ * size)) {

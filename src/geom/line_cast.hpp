@@ -57,8 +57,15 @@ struct LineCast {
 /// The line of all t (-w); rows of hulls are padded to whole lanes.
 LineCast cast_line(const Core& a, const Core& b, Vec3 w);
 
-/// The same for K and all within a cube of that half size about each of its points.
+/// The same for K with a margin: a box about each of its points that reaches at least so far in every direction.
 LineCast cast_line_wide(const Core& a, const Core& b, Vec3 w, double margin);
+
+/// The corner of that box that is lowest along n.  The box is skew on purpose: bodies are often symmetric, and then a
+/// line through a corner or an edge of K would stay one of the wider K.
+inline Vec3 lowest_margin(Vec3 n, double margin) {
+    const auto side = [=](double x, double below, double above) { return margin * (x > 0.0 ? -below : above); };
+    return {side(n.x, 1.0, 1.3719), side(n.y, 1.2391, 1.0843), side(n.z, 1.1137, 1.4287)};
+}
 
 // Error of the height n . v of a vertex v of K along a unit vector, in terms of the reach of the pair: each end
 // is rounded (kVertexError, and the core's own u), their difference by 2 u, the product by 3 u.

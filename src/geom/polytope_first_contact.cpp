@@ -156,6 +156,11 @@ struct Limit {
 /// As far as float64 can tell.
 bool agree(double time, double literal) { return std::fabs(time - literal) <= 8.0 * kSharp * literal; }
 
+/// How far noise may turn a plane that is of a triangle so narrow.
+double turn_of(const MovingPair& pair, double width) {
+    return width > 0.0 ? std::min(pair.noise() / width, kLargestSlack) : kLargestSlack;
+}
+
 /// Contact within the slack.
 class Nearly {
 public:
@@ -181,7 +186,7 @@ public:
     /// Within the slack the line neither enters nor leaves by this facet.
     [[nodiscard]] bool slides(const Limit& at, RayEnd end) const {
         const double reach = pair_.reach();
-        const double turn = std::min(pair_.noise() / at.width, kLargestSlack);
+        const double turn = turn_of(pair_, at.width);
         const double gap_slack = std::min(pair_.noise() + turn * reach, kLargestSlack * reach) +
                                  2.0 * kLowestError * reach;
         const double rate_slack = std::min(pair_.velocity_noise() + turn * pair_.speed(), kLargestSlack * pair_.speed()) +
@@ -195,7 +200,7 @@ public:
         const Vec3 n = portal.normal;
         Limit out;
         out.normal = n;
-        out.gap = portal.height + margin * (std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z));
+        out.gap = portal.height - dot(n, lowest_margin(n, margin));
         out.rate = portal.rate;
         out.width = width_of(portal.corner);
         out.time = out.gap / out.rate;
@@ -206,7 +211,8 @@ public:
         const auto vertex = [&](VertexPair c) { return vertex_of(pair_.b(), c.b) - vertex_of(pair_.a(), c.a); };
         const Vec3 e = vertex(corner[1]) - vertex(corner[0]);
         const Vec3 f = vertex(corner[2]) - vertex(corner[0]);
-        return norm(cross(e, f)) / std::max({norm(e), norm(f), norm(f - e)});
+        const double longest = std::max({norm(e), norm(f), norm(f - e)});
+        return longest > 0.0 ? norm(cross(e, f)) / longest : 0.0;
     }
 
 private:
@@ -311,13 +317,14 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
         out.points = points_.overlapping(pair_, pair_.noise() + rounding);
         return out;
     }
-    // Noise turns the plane by as much as the triangle it is of is narrow, and it shifts the time, hence the place.
-    const double turn = pair_.noise() / width;
+    // Noise turns the plane, and it shifts the time, hence the place.
     ContactSlack slack{};
-    slack.height = std::min(2.0 * pair_.noise() + turn * reach, kLargestSlack * reach) + rounding;
+    slack.height = std::min(2.0 * pair_.noise() + turn_of(pair_, width) * reach, kLargestSlack * reach) + rounding;
     const double rate = std::fabs(dot(out.normal, pair_.velocity()));
-    const double delay = moment > 0.0 ? (pair_.noise() + rounding) / rate * pair_.speed() : 0.0;
-    slack.place = std::min(2.0 * pair_.noise() + delay, kLargestSlack * reach) + rounding;
+    const double shift = (pair_.noise() + rounding) * pair_.speed();
+    const double limit = kLargestSlack * reach;
+    const double delay = moment > 0.0 && shift < rate * limit ? shift / rate : moment > 0.0 ? limit : 0.0;
+    slack.place = std::min(2.0 * pair_.noise() + delay, limit) + rounding;
     out.points = points_.touching(pair_, out.normal, moment, slack);
     return out;
 }
@@ -381,9 +388,15 @@ PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, do
         return nearly.limit(end, std::max(distance, 0.0));
     };
     if (out.status == ContactStatus::will_touch) {
-        const std::optional<Limit> enter = found(RayEnd::enter);
-        if (!enter) {
+        std::optional<Limit> enter = found(RayEnd::enter);
+        if (!enter && !touches) {
             return literal;
+        }
+        if (!enter) {
+            // Whatever the slack would say: the given numbers meet.
+            enter.emplace();
+            round_unit(contact_normal(ray, RayEnd::enter, false), enter->normal);
+            enter->literal = true;
         }
         out.normal = enter->normal;
         width = enter->width;
