@@ -290,10 +290,14 @@ PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
     }
 }
 
-void PolygonPair::load(Ring a, Ring b) {
+void PolygonPair::load_places(Ring a, Ring b) {
     if (!place(a, b, false)) {
         place(hulls_[0].of(a), hulls_[1].of(b), true);
     }
+}
+
+void PolygonPair::load(Ring a, Ring b) {
+    load_places(a, b);
     project();
 }
 

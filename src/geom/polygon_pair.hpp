@@ -147,6 +147,8 @@ public:
 
     /// Takes up two valid rings; they must outlive their use.
     void load(Ring a, Ring b);
+    /// Only places and axes, no gaps.
+    void load_places(Ring a, Ring b);
 
     [[nodiscard]] const PairedPolygon& side(int i) const { return sides_[static_cast<std::size_t>(i)]; }
     [[nodiscard]] const PairedPolygon& other(int i) const { return sides_[static_cast<std::size_t>(1 - i)]; }
