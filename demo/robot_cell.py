@@ -157,14 +157,18 @@ class Stream:
         self._thread.start()
 
     def _run(self) -> None:
-        tick = 0
-        while not self._stop.wait(self.PERIOD_S):
+        # A polygon's velocity is that from one message to the next.  So the last two must be of one pass: across a
+        # restart they would say that everything moves back.
+        tick, passes = 0, [-1, -2]
+        while not (self._stop.is_set() and passes[-1] == passes[-2]):
+            time.sleep(self.PERIOD_S)
             now = self._client.node.get_clock().now()
             elapsed = (now - self._start).nanoseconds * 1e-9
             self._client.states.publish(self._state(now, elapsed))
             if tick % 5 == 0:
                 for mover in cell.MOVERS:
                     self._client.polygons.publish(self._polygon(mover, now, elapsed))
+                passes.append(int(elapsed))
                 self._client.camera.publish(self._camera(now))
             tick += 1
 
