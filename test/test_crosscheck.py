@@ -224,8 +224,7 @@ def no_exact_tier(monkeypatch):
 
 def test_exact_arithmetic_decides_where_it_can(rng):
     shapes, poses, said = lattice(rng, 1200 * SCALE)
-    if crosscheck._exactly(*shapes[0], poses[0]) is None:
-        pytest.skip("no exact kernel for boxes")
+    assert crosscheck._exactly(*shapes[0], poses[0]) is not None
     tally, differences = judged(shapes, poses, said)
     assert adds_up(tally) and tally.unexplained == tally.engine_wrong == 0, report(differences)
     assert tally.explained >= 10 and all("exact arithmetic gives" in d.reason for d in differences)

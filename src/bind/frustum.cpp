@@ -18,17 +18,6 @@ namespace geomsrv::bind {
 
 namespace {
 
-Frustum unpack(const double* p) {
-    return {.origin = {p[0], p[1], p[2]},
-            .axes = {{{p[3], p[4], p[5]}, {p[6], p[7], p[8]}, {p[9], p[10], p[11]}}},
-            .l0 = p[12],
-            .l1 = p[13],
-            .u0 = p[14],
-            .u1 = p[15],
-            .near = p[16],
-            .far = p[17]};
-}
-
 struct BoxRows {
     const double *center, *axes, *half_extents;
 
@@ -227,7 +216,7 @@ void define_frustum(nb::module_& m) {
                                        : tier == "float32" ? cull_all<FloatLanes, CullTier::float32>
                                        : tier == "float64" ? cull_all<Lanes, CullTier::float64>
                                                            : cull_all<Lanes, CullTier::exact>;
-                const Frustum frustum = unpack(packed.data());
+                const Frustum frustum = unpacked_frustum(packed.data());
                 const BoxRows boxes{center.data(), axes.data(), half_extents.data()};
                 counts = cull_tier(frustum, boxes, count, answers);
                 if (evidence) find_evidence(frustum, boxes, count, answers, simplex.data, beyond.data);
