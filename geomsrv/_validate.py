@@ -67,7 +67,7 @@ def floats(
         if np.isnan(numbers).any():
             raise GeometryError(f"{name}{_where(numbers, int(np.isnan(numbers).argmax()))} is nan")
         return numbers
-    bad = _core.first_nonfinite(numbers.reshape(-1))
+    bad = _core.first_nonfinite(numbers)
     if bad >= 0:
         raise GeometryError(f"{name}{_where(numbers, bad)} is {numbers.reshape(-1)[bad]}, must be finite")
     return numbers
@@ -96,6 +96,15 @@ def scalar(value: Any, name: str, *, positive: bool = False, minimum: float | No
         raise GeometryError(f"{name} must be > 0, got {number}")
     if minimum is not None and number < minimum:
         raise GeometryError(f"{name} must be >= {minimum:g}, got {number}")
+    return number
+
+
+def limit(value: Any, name: str) -> float:
+    """The end of a range that begins at 0: one number >= 0 that may be inf."""
+    plain = type(value) is float and not math.isnan(value)
+    number = value if plain else float(floats(value, name, (), allow_infinite=True))
+    if not number >= 0.0:
+        raise GeometryError(f"{name} must be >= 0, got {number}")
     return number
 
 
@@ -132,50 +141,24 @@ def _rising(ends: list[int], total: int, minimum_count: int) -> bool:
 def axes(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """Unit, mutually perpendicular rows, taken literally up to `MAX_AXES_DEFECT`; either handedness."""
     rows = floats(value, name, shape)
-    if rows.size <= ONE_BY_ONE * 9 and all(map(_orthonormal, rows.reshape(-1, *rows.shape[-2:]).tolist())):
-        return rows
-    with np.errstate(over="ignore", invalid="ignore"):  # huge entries give inf and nan, refused below
-        gram = rows @ np.swapaxes(rows, -1, -2)
-        defect = np.abs(gram - np.eye(rows.shape[-1])).max(axis=(-1, -2), initial=0.0)
-    bad = np.ravel(~(defect <= MAX_AXES_DEFECT))
-    if bad.any():
-        i = int(np.argmax(bad))
-        item = f"[{i}]" if rows.ndim == 3 else ""
+    bad, defect = _core.first_skewed(rows, MAX_AXES_DEFECT)
+    if bad >= 0:
+        item = f"[{bad}]" if rows.ndim == 3 else ""
         raise GeometryError(
-            f"{name}{item} must have orthonormal rows, off by {np.ravel(defect)[i]:.3g} (at most {MAX_AXES_DEFECT:g})"
+            f"{name}{item} must have orthonormal rows, off by {defect:.3g} (at most {MAX_AXES_DEFECT:g})"
         )
     return rows
-
-
-def _orthonormal(rows: list[list[float]]) -> bool:
-    """What `axes` asks of one item."""
-    for i, a in enumerate(rows):
-        for j, b in enumerate(rows[: i + 1]):
-            if not abs(math.sumprod(a, b) - (i == j)) <= MAX_AXES_DEFECT:
-                return False
-    return True
 
 
 def poses(value: Any, name: str = "poses") -> NDArray[np.float64]:
     """(n, 7) or (7,) rows x y z qx qy qz qw -> (n, 7) with unit quaternions."""
     given = array(value, name)
     rows = floats(given, name, (7,) if given.ndim == 1 else (None, 7)).reshape(-1, 7)
-    if len(rows) <= ONE_BY_ONE:
-        norms = [math.sqrt(x * x + y * y + z * z + w * w) for x, y, z, w in rows[:, 3:].tolist()]
-        if all(abs(length - 1.0) <= MAX_QUATERNION_DEFECT for length in norms):
-            placed = rows.copy()
-            placed[:, 3:] /= np.array(norms)[:, None]
-            return placed
-    with np.errstate(over="ignore"):  # huge entries give inf, refused below
-        norm = np.linalg.norm(rows[:, 3:], axis=1)
-    bad = ~(np.abs(norm - 1.0) <= MAX_QUATERNION_DEFECT)
-    if bad.any():
-        i = int(np.argmax(bad))
-        item = f"[{i}]" if given.ndim == 2 else ""
-        raise GeometryError(f"{name}{item} quaternion x y z w must have norm 1, got {norm[i]:.6g}")
-    out = rows.copy()
-    out[:, 3:] /= norm[:, None]
-    return out
+    placed, bad, norm = _core.unit_quaternions(rows, MAX_QUATERNION_DEFECT)
+    if bad >= 0:
+        item = f"[{bad}]" if given.ndim == 2 else ""
+        raise GeometryError(f"{name}{item} quaternion x y z w must have norm 1, got {norm:.6g}")
+    return placed
 
 
 def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -298,9 +298,7 @@ def listed_first_contacts(
     """First contacts within `horizon` [s] of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
     tier = _validate.accuracy(accuracy)
-    end = float(_validate.floats(horizon, "horizon", (), allow_infinite=True))
-    if not end >= 0.0:
-        raise GeometryError(f"horizon must be >= 0, got {end}")
+    end = _validate.limit(horizon, "horizon")
     if _all_slide(world, pairs):
         return _sliding_polygons(world, pairs, end, tier, start)
     listed = _Listed(world, pairs)

@@ -249,9 +249,7 @@ def first_contact(
     moving_a, moving_b = (
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
-    end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
-    if not end >= 0.0:
-        raise GeometryError(f"t_max must be >= 0, got {end}")
+    end = _validate.limit(t_max, "t_max")
     tier = _validate.accuracy(accuracy, SHAPE_TIERS if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None

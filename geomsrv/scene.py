@@ -478,7 +478,7 @@ class Scene:
             Names the argument and the fault; a `SceneError` for unknown ids.
         """
         start = time.perf_counter_ns()
-        limit = _limit(max_distance, "max_distance")
+        limit = _validate.limit(max_distance, "max_distance")
         return self._distances(start, limit, ids, others, want, accuracy)
 
     def contacts(
@@ -540,7 +540,7 @@ class Scene:
             Names the argument and the fault; a `SceneError` for unknown ids.
         """
         start = time.perf_counter_ns()
-        limit = _limit(horizon, "horizon")
+        limit = _validate.limit(horizon, "horizon")
         tier = _validate.accuracy(accuracy)
         world = self.world
         selection = _selection(world, ids, others)
@@ -769,13 +769,6 @@ def _array(value: ArrayLike, name: str, shape: tuple[int, int]) -> FloatArray:
     if array.dtype.kind not in "fiu" or array.shape != shape:
         return _validate.floats(array, name, shape)
     return np.ascontiguousarray(array, dtype=np.float64)
-
-
-def _limit(value: float, name: str) -> float:
-    number = float(_validate.floats(value, name, (), allow_infinite=True))
-    if not number >= 0.0:
-        raise GeometryError(f"{name} must be >= 0, got {number}")
-    return number
 
 
 def _members(world: World, ids: Iterable[str], name: str) -> BoolArray:

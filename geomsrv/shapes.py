@@ -77,13 +77,13 @@ def _window(left: Any, up: Any, bounds: Any, names: tuple[str, ...]) -> tuple[fl
         return tuple(sign * size for size in sizes for sign in (-1.0, 1.0))
     if any(half is not None for half in halves):
         raise GeometryError(f"bounds and {' or '.join(names)} exclude each other")
-    window = _validate.floats(bounds, "bounds", (2 * len(names),))
+    window = _validate.floats(bounds, "bounds", (2 * len(names),)).tolist()
     for k in range(len(names)):
         if not window[2 * k] < window[2 * k + 1]:
             raise GeometryError(
                 f"bounds[{2 * k}] must be < bounds[{2 * k + 1}], got {window[2 * k]}, {window[2 * k + 1]}"
             )
-    return tuple(float(x) for x in window)
+    return tuple(window)
 
 
 def _depths(near: Any, far: Any) -> tuple[float, float]:

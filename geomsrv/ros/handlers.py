@@ -294,6 +294,7 @@ class Handlers:
         self._allowed("first_contact")
         want = self._want(request, "first_contact", "contact_set")
         answer: PairContacts | ListedContacts
+        order: IntArray | None
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE, "twists_a", "twists_b")
             _listed_only(request)
@@ -305,7 +306,7 @@ class Handlers:
         else:
             world, pairs = self._listed(request, moving=True)
             answer = listed_first_contacts(world, pairs, request.horizon, accuracy=accuracy)
-            order = np.arange(len(pairs))
+            order = None  # that of the request
             if request.certificates:
                 lines = contact_certificates(world, pairs, request.horizon, accuracy=accuracy)
                 response.certificates = list(lines)
@@ -377,10 +378,9 @@ class Handlers:
             )
             for s in "ab"
         )
-        velocities = []
-        for name in ("velocities_a", "velocities_b"):
-            rows = convert.rows(getattr(request, name), name, dimension)
-            velocities.append(rows[0] if len(rows) == 1 else rows)
+        velocities = (
+            convert.rows(getattr(request, name), name, dimension) for name in ("velocities_a", "velocities_b")
+        )
         answer = queries.first_contact(
             a,
             b,
@@ -390,7 +390,7 @@ class Handlers:
             contact_set="contact_set" in want,
             certificates=request.certificates,
         )
-        _set_first_contacts(response, answer, np.arange(len(answer.status)), want)
+        _set_first_contacts(response, answer, None, want)
         _set_certificates(response, answer)
         _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
 
@@ -563,12 +563,16 @@ def _set_certificates(response: Any, answer: Any) -> None:
         response.certificates = list(answer.certificates.lines())
 
 
-def _set_first_contacts(response: Any, answer: Any, order: IntArray, want: tuple[str, ...]) -> None:
-    response.item_status = convert.bytes_(answer.status[order])
+def _set_first_contacts(response: Any, answer: Any, order: IntArray | None, want: tuple[str, ...]) -> None:
+    """The answer's rows in the given order, or as they are."""
+    rows: Any = slice(None) if order is None else order
+    response.item_status = convert.bytes_(answer.status[rows])
     for name in _CONTACT_COLUMNS:
-        setattr(response, name, convert.doubles(getattr(answer, name)[order]))
+        setattr(response, name, convert.doubles(getattr(answer, name)[rows]))
     if "contact_set" in want:
-        points, offsets = gather(answer.points, answer.point_offsets, order)
+        points, offsets = answer.points, answer.point_offsets
+        if order is not None:
+            points, offsets = gather(points, offsets, order)
         response.points, response.point_offsets = convert.doubles(points), convert.uint32s(offsets)
     convert.set_cost(response.cost, answer.cost)
 

@@ -26,6 +26,7 @@ namespace nb = nanobind;
 template <class T, class... Shape>
 using Input = nb::ndarray<const T, Shape..., nb::c_contig, nb::device::cpu>;
 
+using Numbers = Input<double>;  // of any shape
 using Values = Input<double, nb::ndim<1>>;
 using Rows2 = Input<double, nb::shape<-1, 2>>;
 using Rows3 = Input<double, nb::shape<-1, 3>>;
@@ -71,6 +72,16 @@ inline void* huge_pages(std::size_t bytes) {
     return memory;
 }
 
+template <class T>
+constexpr const char* dtype_name() {
+    return std::is_same_v<T, double>         ? "float64"
+           : std::is_same_v<T, std::int64_t> ? "int64"
+           : std::is_same_v<T, std::int32_t> ? "int32"
+           : std::is_same_v<T, std::int8_t>  ? "int8"
+           : std::is_same_v<T, bool>         ? "bool"
+                                             : "uint8";
+}
+
 /// An array to be filled.
 template <class T>
 Output<T> empty(std::initializer_list<std::size_t> shape) {
@@ -83,18 +94,24 @@ Output<T> empty(std::initializer_list<std::size_t> shape) {
         const nb::ndarray<nb::numpy, T, nb::c_contig> array(memory, shape.size(), shape.begin(), owner);
         return {nb::cast(array), static_cast<T*>(memory)};
     }
-    const char* dtype = std::is_same_v<T, double>         ? "float64"
-                        : std::is_same_v<T, std::int64_t> ? "int64"
-                        : std::is_same_v<T, std::int32_t> ? "int32"
-                        : std::is_same_v<T, std::int8_t>  ? "int8"
-                        : std::is_same_v<T, bool>         ? "bool"
-                                                          : "uint8";
-    nb::list sizes;
+    // Looked up once and kept for good: for a small answer the way to numpy takes longer than the kernel.
+    static PyObject* const numpy_empty =
+        nb::object(nb::module_::import_("numpy").attr("empty")).release().ptr();
+    static PyObject* const dtype =
+        nb::module_::import_("numpy").attr("dtype")(dtype_name<T>()).release().ptr();
+    const nb::object sizes = nb::steal(PyTuple_New(static_cast<Py_ssize_t>(shape.size())));
+    Py_ssize_t axis = 0;
     for (const std::size_t size : shape) {
-        sizes.append(size);
+        PyTuple_SET_ITEM(sizes.ptr(), axis++, PyLong_FromSize_t(size));
     }
-    nb::object array = nb::module_::import_("numpy").attr("empty")(nb::tuple(sizes), dtype);
-    return {array, nb::cast<nb::ndarray<T, nb::c_contig, nb::device::cpu>>(array).data()};
+    PyObject* const arguments[] = {sizes.ptr(), dtype};
+    nb::object array = nb::steal(PyObject_Vectorcall(numpy_empty, arguments, 2, nullptr));
+    Py_buffer view;
+    if (!array.is_valid() || PyObject_GetBuffer(array.ptr(), &view, PyBUF_WRITABLE) != 0)
+        nb::raise_python_error();
+    T* const data = static_cast<T*>(view.buf);
+    PyBuffer_Release(&view);  // the array keeps its memory
+    return {array, data};
 }
 
 }  // namespace geomsrv::bind

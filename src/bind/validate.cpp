@@ -3,6 +3,7 @@
 // Checks that are too slow in numpy; the Python layer words the errors.
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
@@ -36,16 +37,63 @@ std::int64_t first_nonfinite(const double* values, std::size_t count) {
     return -1;
 }
 
+/// How far the rows of a (d, d) matrix are from unit length and right angles; NaN where they overflow.
+double axes_defect(const double* rows, std::size_t d) {
+    double worst = 0.0;
+    for (std::size_t i = 0; i < d; ++i) {
+        for (std::size_t j = 0; j <= i; ++j) {
+            double product = i == j ? -1.0 : 0.0;
+            for (std::size_t k = 0; k < d; ++k) {
+                product += rows[i * d + k] * rows[j * d + k];
+            }
+            if (std::isnan(product)) return product;
+            worst = std::max(worst, std::abs(product));
+        }
+    }
+    return worst;
+}
+
+/// Index of the first matrix, and its defect, that is off by more than `limit`; or -1.
+nb::tuple first_skewed(const Numbers& matrices, double limit) {
+    const std::size_t d = matrices.shape(matrices.ndim() - 1);
+    const std::size_t count = matrices.size() / (d * d);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double defect = axes_defect(matrices.data() + i * d * d, d);
+        if (!(defect <= limit)) return nb::make_tuple(i, defect);
+    }
+    return nb::make_tuple(-1, 0.0);
+}
+
+/// The same rows x y z qx qy qz qw with unit quaternions, and the index and norm of the first quaternion
+/// whose norm is off by more than `limit`; or -1.
+nb::tuple unit_quaternions(const Rows7& poses, double limit) {
+    const std::size_t count = poses.shape(0);
+    const Output<double> out = empty<double>({count, 7});
+    for (std::size_t i = 0; i < count; ++i) {
+        const double* const row = poses.data() + 7 * i;
+        const double norm = std::sqrt(row[3] * row[3] + row[4] * row[4] + row[5] * row[5] + row[6] * row[6]);
+        if (!(std::abs(norm - 1.0) <= limit)) return nb::make_tuple(out.array, i, norm);
+        double* const placed = out.data + 7 * i;
+        std::copy_n(row, 3, placed);
+        for (std::size_t k = 3; k < 7; ++k) {
+            placed[k] = row[k] / norm;
+        }
+    }
+    return nb::make_tuple(out.array, -1, 1.0);
+}
+
 }  // namespace
 
 void define_validate(nb::module_& m) {
     m.def(
         "first_nonfinite",
-        [](const Values& values) {
+        [](const Numbers& values) {
             const nb::gil_scoped_release unlocked;
             return first_nonfinite(values.data(), values.size());
         },
         nb::arg("values").noconvert());
+    m.def("first_skewed", first_skewed, nb::arg("matrices").noconvert(), nb::arg("limit"));
+    m.def("unit_quaternions", unit_quaternions, nb::arg("poses").noconvert(), nb::arg("limit"));
 }
 
 }  // namespace geomsrv::bind
