@@ -390,15 +390,15 @@ def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> F
      -depth +..............`......+
     """
     end = np.minimum(rows.last_time, horizon)
-    far = np.isinf(rows.time)  # beyond the doubles
-    rows = replace(rows, time=np.where(far, 0.0, rows.time))
+    # A time beyond the doubles is looked at where it can be: at the start, where they are apart.
+    rows = replace(rows, time=np.where(np.isinf(rows.time), 0.0, rows.time))
     middle = np.where((rows.status == ContactStatus.OVERLAPPING) | np.isinf(end), rows.time, 0.5 * (rows.time + end))
     depth = -_distance_at(world, rows.pairs, middle, True)[2]
     deep = depth >= by
     share = np.divide(by, depth, out=np.zeros_like(by), where=deep)
     latest = rows.upper + share * (middle - rows.time) * (1.0 + TIME_ROUNDING)
     latest = np.where(middle > rows.time, np.nextafter(latest, np.inf), rows.upper)
-    return np.where(deep & ~far, latest, np.inf)
+    return np.where(deep, latest, np.inf)
 
 
 def _distance_at(

@@ -250,6 +250,12 @@ def test_changes_are_validated_and_take_effect(client) -> None:
         ):
             result = set_parameter(client, name, bad)
             assert not result.successful and text in result.reason, (name, bad, result.reason)
+        # Volumes may be nearer than what they hold.
+        for tier in ("bound", "exact"):
+            assert set_parameter(client, "accuracy", tier).successful
+            got = distances.wait(lambda m, tier=tier: m.cost.accuracy == tier)
+            assert all(pair.lower <= 1.0 <= pair.upper for pair in got.distances)
+            assert client.call(srv.Distance, "distance", select=2, max_distance=2.0).cost.accuracy == tier
         assert set_parameter(client, "effects.distance", False).successful
         got = client.call(srv.Distance, "distance", select=2)
         assert got.status == got.NOT_AVAILABLE and "effects.distance" in got.message

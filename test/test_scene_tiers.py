@@ -182,6 +182,15 @@ def test_tiers_agree_about_the_same_scene(rng, make) -> None:
     assert len(scene.distances(limit, accuracy="bound")) > len(exactly), "volumes are larger"
 
 
+@pytest.mark.parametrize("make", [solids, partial(rings, uncertainty=1e-3)])
+def test_a_bound_is_one_wherever_the_objects_may_be(rng, make) -> None:
+    answer = scene_of(make(rng)).distances(INF, want=("penetration",), accuracy="bound")
+    by_volumes = answer.distance == answer.lower
+    assert by_volumes.sum() > 50
+    kinds = [scene_kind for scene_kind in answer.cost.counts if "half_space" in scene_kind]
+    assert by_volumes.all() or kinds, "half spaces are their own volumes"
+
+
 @pytest.mark.parametrize("tier", SHAPE_TIERS)
 @pytest.mark.parametrize("make", [solids, rings])
 def test_the_nearest_pair(rng, tier, make) -> None:
@@ -357,16 +366,19 @@ def exact_state(frustum, points):
 
 
 def literal_points(world, row):
-    """Vertices of a hull or polygon at its pose, as fractions."""
+    """Vertices of a hull, polygon or frustum at its pose, as fractions."""
     shape = world.table.shapes[world.shape[row]]
-    vertices = np.column_stack([shape.vertices, np.zeros((len(shape.vertices), 3 - shape.vertices.shape[1]))])
-    return moved(vertices, world.rotations[row], world.poses[row, :3])
+    if isinstance(shape, gs.Frustum):
+        points = polytope.frustum_corners(*view(shape))
+    else:
+        points = exact([[*v, 0.0][:3] for v in shape.vertices.tolist()])
+    return moved(points, world.rotations[row], world.poses[row, :3])
 
 
-def moved(vertices, rotation, translation):
+def moved(points, rotation, translation):
     """Points at a pose, both taken literally, as fractions."""
     rows = list(zip(exact(rotation.tolist()), exact(translation.tolist()), strict=True))
-    return [tuple(dot(row, v) + step for row, step in rows) for v in exact(vertices.tolist())]
+    return [tuple(dot(row, v) + step for row, step in rows) for v in points]
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -404,8 +416,32 @@ def test_hulls_are_culled_as_exact_arithmetic_says(rng, skew) -> None:
         place = np.array([*rng.choice([-1.0, 0.0, 0.5, 1.0, 1.5], 2) * depth, depth])
         place = place @ axes if skew else np.where(rng.random(3) < 0.2, np.nextafter(place, 99.0), place)
         turn = turned(rng) if k % 3 == 0 else UPRIGHT
-        hull = gs.Convex(rng.integers(-2, 3, (rng.integers(1, 6), 3)) / 2.0)
-        objects.append(gs.SceneObject(f"{k:03}", hull, (*place, *turn)))
+        if k % 5:
+            shape = gs.Convex(rng.integers(-2, 3, (rng.integers(1, 6), 3)) / 2.0)
+        else:
+            shape = gs.Frustum(rng.integers(-1, 2, 3) / 2.0, np.eye(3)[[1, 2, 0]], 0.5, 0.25, 0.5, 1.5)
+        objects.append(gs.SceneObject(f"{k:03}", shape, (*place, *turn)))
+    check_cull(camera, objects)
+    counts = scene_of(objects).cull(camera, accuracy="exact").cost.counts
+    assert counts["shapes"] > 10 and (skew or counts["exact"] > 5)
+
+
+def test_polygons_are_culled_as_exact_arithmetic_says(rng) -> None:
+    """From a camera that looks along their plane, which touches the upper side of the view in one case."""
+    ring = gs.Polygon([[0, 0], [0.5, -0.5], [1, 0], [0.5, 0.5]])
+    flat = []
+    for k in range(120):
+        depth = rng.integers(0, 24) / 2.0
+        yaw = rng.uniform(0.0, 3.0) * (k % 3 == 0)
+        pose = (depth, *(rng.integers(-2, 3, 1) / 2.0 * depth), 0, 0, 0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
+        flat.append(gs.SceneObject(f"{k:03}", ring, pose))
+    for up in ((-1.0, 1.0), (0.0, 1.0)):
+        bounds = (-1.0, 1.0, *up)
+        check_cull(gs.Frustum((0.0, 0.0, 0.0), np.eye(3)[[1, 2, 0]], near=1.0, far=10.0, bounds=bounds), flat)
+
+
+def check_cull(camera, objects):
+    """Where a tier is certain it says what exact arithmetic says, and "exact" always is."""
     scene = scene_of(objects)
     truth = np.array([exact_state(camera, literal_points(scene.world, row)) for row in range(len(objects))])
     assert (np.bincount(truth, minlength=3) > 10).all()
@@ -417,8 +453,6 @@ def test_hulls_are_culled_as_exact_arithmetic_says(rng, skew) -> None:
             assert got.certain.all()
         elif tier == "bound":
             assert (got.state[~got.certain] == gs.INTERSECTS).all() and not got.certain.all()
-    counts = scene.cull(camera, accuracy="exact").cost.counts
-    assert counts["shapes"] > 10 and (skew or counts["exact"] > 5)
 
 
 def test_round_shapes_are_culled_to_the_last_bit() -> None:
@@ -512,7 +546,7 @@ def test_exact_distance_is_the_oracle_s(rng) -> None:
     world, pairs = scene.world, all_pairs(scene.world)
     answer = scene.distances(INF, accuracy="exact")
     for k, ((i, j), pose) in enumerate(zip(pairs, gs._validate.poses(relative_poses(world, pairs)), strict=True)):
-        there = moved(hulls[j].vertices, gs._validate.rotation_matrices(pose[None, 3:])[0], pose[:3])
+        there = moved(exact(hulls[j].vertices.tolist()), gs._validate.rotation_matrices(pose[None, 3:])[0], pose[:3])
         square = polytope.squared_distance(exact(hulls[i].vertices.tolist()), there)
         assert answer.distance[k] == root_double(square), reproducer(
             a=hulls[i].vertices, b=hulls[j].vertices, pose=pose
