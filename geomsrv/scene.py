@@ -228,6 +228,8 @@ class SceneCull:
     message : str
         Names the kinds that could only be judged by their bounding box; empty otherwise.
     cost : Cost
+        ``counts``: objects, "boxes" around them, "shapes" that were looked at themselves, and verdicts by stage: of
+        boxes as for `cull`, and, at other tiers than "float64", of shapes.
     version : int
     stamp : object
     """

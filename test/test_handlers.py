@@ -429,6 +429,14 @@ def test_certificates_say_what_the_answer_says(desk) -> None:
     assert got.lower[0] <= float.fromhex(claim["lower"]) <= 0.5 <= float.fromhex(claim["upper"]) <= got.upper[0]
     (state,) = claims(desk.ask("Cull", ids=["box"], certificates=True))
     assert state == {"state": "INSIDE"}
+    # Turned bodies: the number is that of the same literal pose, only the interval covers the rounding of it.
+    turned = [gs.SceneObject("a", HULL_A, POSE_A), gs.SceneObject("b", HULL_B, POSE_B)]
+    desk.engine.apply(gs.SceneUpdate(add=turned))
+    for tier in ("float64", "exact"):
+        got = desk.ask("Distance", ids_a=["a"], ids_b=["b"], certificates=True, accuracy=tier)
+        (claim,) = claims(got)
+        assert float.fromhex(claim["distance"]) == got.distance[0] and claim["meets"] is False
+        assert got.lower[0] < float.fromhex(claim["lower"]) < float.fromhex(claim["upper"]) < got.upper[0]
 
 
 def test_objects_that_may_be_elsewhere_are_not_certified(desk) -> None:
