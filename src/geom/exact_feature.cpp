@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "geom/lanes.hpp"
+#include "geom/lane_arithmetic.hpp"
 #include "geom/pair.hpp"
 
 namespace geomsrv {
@@ -224,27 +224,16 @@ GEOMSRV_INLINE void evaluate_in_pairs(const Difference& k, const Witness& s, Fea
     out.divisor = enclosed(quick.divisor, 3.0 * area * area);
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
-// One binary serves every x86-64.
-__attribute__((target("fma"), flatten)) void evaluate_fused(const Difference& k, const Witness& s,
-                                                            FeatureOf<Enclosed>& out) {
+// Everything in it melts into it, to be compiled for its instruction set.
+[[gnu::flatten]] GEOMSRV_FUSED void evaluate_fused(const Difference& k, const Witness& s,
+                                                   FeatureOf<Enclosed>& out) {
     evaluate_in_pairs<true>(k, s, out);
 }
-bool is_fused() {
-    static const bool known = __builtin_cpu_supports("fma") != 0;
-    return known;
-}
-#else
-void evaluate_fused(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out) {
-    evaluate_in_pairs<true>(k, s, out);
-}
-constexpr bool is_fused() { return false; }
-#endif
 
 }  // namespace
 
 void evaluate_quickly(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out) {
-    if (is_fused()) {
+    if (has_fused()) {
         evaluate_fused(k, s, out);
     } else {
         evaluate_in_pairs<false>(k, s, out);
