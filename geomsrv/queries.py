@@ -102,10 +102,17 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
-    state, certain, counts, *evidence = _core.cull(*given, tier, certified)
+    state, certain, counts = _core.cull(*given, tier, False)[:3]
+
+    def evidence(i: int) -> tuple[Any, Any]:
+        packed, center, axes, half_extents = given
+        row = slice(i, i + 1)
+        alone: Any = _core.cull(packed, center[row], axes[row], half_extents[row], tier, True)
+        return alone[3][0], alone[4][0]
+
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
-    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, *evidence) if certified else None)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, evidence) if certified else None)
 
 
 def distance_to_frustum(
@@ -168,10 +175,14 @@ def distance_to_frustum(
     certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
     given = frustum.packed(), array, tier
-    gap, lower, upper, region, point_a, simplex, rungs = kernel(*given, "witness" in effects, certified)
+    gap, lower, upper, region, point_a, _, rungs = kernel(*given, "witness" in effects, False)
 
     def nearest() -> FloatArray:
         return np.full_like(array, np.nan) if tier == "bound" else cast(FloatArray, kernel(*given, True, False)[4])
+
+    def simplex(i: int) -> Any:
+        alone: Any = kernel(given[0], array[i : i + 1], tier, False, True)
+        return alone[5][0]
 
     return Distances(
         distance=gap,
