@@ -534,7 +534,7 @@ def tight(lower, upper):
     return (upper - lower) / np.maximum(np.abs(lower), np.abs(upper))
 
 
-@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("tier", ["bound", "float32"])
 @pytest.mark.parametrize("kind", SCENES)
 def test_what_lower_tiers_prove_of_contacts(rng, kind, tier):
     """Nothing is missed, what is certain is so, and times are within their bounds."""
@@ -567,7 +567,7 @@ def test_what_lower_tiers_prove_of_contacts(rng, kind, tier):
     assert min(reached[gs.NEVER], reached["certain"], reached[gs.WILL_TOUCH]) >= 50, reached
 
 
-@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("tier", ["bound", "float32"])
 @pytest.mark.parametrize("kind", SCENES)
 def test_what_lower_tiers_prove_of_distances(rng, kind, tier):
     scenes = [SCENES[kind](rng) for _ in range(200)]
