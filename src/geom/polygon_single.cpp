@@ -62,6 +62,11 @@ constexpr double kWayError = 8.0 * kUnitRoundoff;
 // The axes of edges that are shorter count as unknown: below 2^-1022 they are not even known in double.
 constexpr double kShortestAxis = 0x1p-960;
 
+// An interval of a distance that is wider has not been found at the right places: rounding makes two gap
+// errors and two width errors of numbers up to 2 sqrt(8), 2 (15 sqrt(8) + 6 * 2 sqrt(8)) units of
+// kSingleRoundoff.
+constexpr float kWideInterval = 256.0F * kSingleRoundoff;
+
 // Shorter lengths are lost when squared.
 constexpr double kShortest = 0x1p-400;
 
@@ -402,7 +407,7 @@ struct Facing {
     std::array<Vec2, 2> points;
     Vec2 way;
     double square = std::numeric_limits<double>::infinity();
-    bool amid = false;
+    bool amid = false;  ///< whether one of them is amid an edge
 
     [[nodiscard]] bool coincide() const {
         return !amid && points[0].x == points[1].x && points[0].y == points[1].y;
@@ -412,34 +417,50 @@ struct Facing {
         return std::max(std::fabs(way.x), std::fabs(way.y)) > kShortest ? std::sqrt(square)
                                                                         : std::hypot(way.x, way.y);
     }
+    /// Takes the nearest points of an edge, of the polygon of that side, and a vertex of the other polygon,
+    /// if they are nearer to each other.
+    void consider(const PolygonPair& pair, int side, std::size_t start, std::size_t end, std::size_t vertex) {
+        const Ring ring = pair.side(side).ring;
+        const Vec2 v = pair.side(1 - side).ring[vertex];
+        const Foot foot = foot_of(pair, ring[start], ring[end], v);
+        const double candidate = dot(foot.way, foot.way);
+        if (candidate < square) {
+            const Vec2 at = foot.amid ? on_edge(pair, ring[start], foot.edge, foot.place)
+                                      : ring[foot.place > 0.0 ? end : start];
+            *this = side == 0 ? Facing{{at, v}, foot.way, candidate, foot.amid}
+                              : Facing{{v, at}, -foot.way, candidate, foot.amid};
+        }
+    }
 };
 
 /// Points that are nearest, if the axis is next to the direction of the distance: near its edge or tip, and
 /// near the vertex of the other polygon that is lowest along it.
-Facing facing_points(const SinglePair& single, AxisOf axis) {
+Facing nearest_by_axis(const SinglePair& single, AxisOf axis) {
     const PolygonPair& pair = single.places();
     const PairedPolygon& own = pair.side(axis.side);
     const PairedPolygon& other = pair.other(axis.side);
     Facing found;
-    const auto consider = [&](int side, std::size_t start, std::size_t end, std::size_t vertex) {
-        const Ring ring = pair.side(side).ring;
-        const Vec2 v = pair.side(1 - side).ring[vertex];
-        const Foot foot = foot_of(pair, ring[start], ring[end], v);
-        const double square = dot(foot.way, foot.way);
-        if (square < found.square) {
-            const Vec2 at = foot.amid ? on_edge(pair, ring[start], foot.edge, foot.place)
-                                      : ring[foot.place > 0.0 ? end : start];
-            found = side == 0 ? Facing{{at, v}, foot.way, square, foot.amid}
-                              : Facing{{v, at}, -foot.way, square, foot.amid};
-        }
-    };
     const std::size_t start = own.base(axis.index);
     const std::size_t end = axis.index < own.edges ? own.next(start) : start;
     const std::size_t vertex = lowest_vertex(single, axis).vertex;
-    consider(axis.side, start, end, vertex);
+    found.consider(pair, axis.side, start, end, vertex);
     for (const std::size_t i : {start, end}) {
-        consider(1 - axis.side, vertex, other.next(vertex), i);
-        consider(1 - axis.side, other.previous(vertex), vertex, i);
+        found.consider(pair, 1 - axis.side, vertex, other.next(vertex), i);
+        found.consider(pair, 1 - axis.side, other.previous(vertex), vertex, i);
+    }
+    return found;
+}
+
+/// Points that are nearest of all.
+Facing nearest_of_all(const PolygonPair& pair) {
+    Facing found;
+    for (const int side : {0, 1}) {
+        const PairedPolygon& p = pair.side(side);
+        for (std::size_t i = 0; i < p.vertices; ++i) {
+            for (std::size_t j = 0; j < pair.other(side).vertices; ++j) {
+                found.consider(pair, side, i, p.next(i), j);
+            }
+        }
     }
     return found;
 }
@@ -455,17 +476,28 @@ Facing deepest_points(const SinglePair& single, AxisOf axis) {
     const auto place_of = [&](std::size_t j) {
         return square > 0.0 ? dot(pair.way(start, other.ring[j]), edge) / square : 0.0;
     };
-    const std::size_t vertex = lowest_vertex(single, axis).vertex;
-    const double at = place_of(vertex);
+    std::size_t vertex = lowest_vertex(single, axis).vertex;
+    double at = place_of(vertex);
+    // Beside the edge only where, up to rounding, others are as low: somewhere on the way along them.
     const double place = std::clamp(at, 0.0, 1.0);
-    Vec2 opposite = other.ring[vertex];
-    if (at != place) {
-        // Beside the edge only where, up to rounding, the next vertex is as low: somewhere on the way there.
-        const std::size_t next = at > 1.0 ? other.next(vertex) : other.previous(vertex);
-        const double share = (place - at) / (place_of(next) - at);
-        const Vec2 way = pair.way(opposite, other.ring[next]);
-        opposite = on_edge(pair, opposite, way, share > 0.0 ? std::min(share, 1.0) : 0.0);
+    double share = 0.0;
+    std::size_t next = vertex;
+    for (std::size_t steps = 0; at != place && share == 0.0 && steps < other.edges; ++steps) {
+        next = place == 1.0 ? other.next(vertex) : other.previous(vertex);
+        const double to = place_of(next);
+        if (std::fabs(to - place) >= std::fabs(at - place) && (to > place) == (at > place)) {
+            next = vertex;  // it turns back
+            break;
+        }
+        if ((to > place) != (at > place)) {
+            share = (place - at) / (to - at);
+        } else {
+            vertex = next;
+            at = to;
+        }
     }
+    const Vec2 way = pair.way(other.ring[vertex], other.ring[next]);
+    const Vec2 opposite = share > 0.0 ? on_edge(pair, other.ring[vertex], way, share) : other.ring[vertex];
     const Vec2 foot = on_edge(pair, start, edge, place);
     Facing found;
     found.points = axis.side == 0 ? std::array{foot, opposite} : std::array{opposite, foot};
@@ -638,54 +670,64 @@ PolygonDistance SinglePolygonDistanceSolver::solve(Ring a, Ring b, bool penetrat
     pair_.load(a, b);
     const PolygonPair& places = pair_.places();
     const SingleWidths widths = widths_of(pair_);
-    const bool apart = widths.lower > 0.0F;
-    const bool has_edges = widths.edge_width > -kInfinity;
-    const AxisOf axis = pair_.axis(apart || !has_edges ? widths.widest : widths.widest_edge);
     // Lengths of float and of double in given units; a power of two rounds subnormal results only.
     const PowerOfTwo single_unit(-pair_.exponent());
     const PowerOfTwo unit_length(-places.scale_exponent());
-
     PolygonDistance out;
-    out.meet = !apart;
-    out.normal = outward_normal(places, axis);
     if (widths.deep) {
+        const AxisOf axis = pair_.axis(widths.widest_edge);
+        out.meet = true;
+        out.normal = outward_normal(places, axis);
         if (penetration) {
             out.lower = next_down(single_unit * widths.lower);
             out.upper = std::min(next_up(single_unit * widths.upper), 0.0);
             out.distance = std::clamp(single_unit * widths.edge_width, out.lower, out.upper);
-            const Facing points = deepest_points(pair_, axis);
-            out.point_a = points.points[0];
-            out.point_b = points.points[1];
+            const Facing deepest = deepest_points(pair_, axis);
+            out.point_a = deepest.points[0];
+            out.point_b = deepest.points[1];
             return out;
         }
         const std::span<const Vec2> corners = overlap_.of(places, {});
         // The mean of its corners lies inside a convex set.  Only what is too small to find has none.
         Vec2 middle = corners.empty() ? deepest_points(pair_, axis).points[0] : Vec2{};
-        const double share = 1.0 / static_cast<double>(corners.size());
         for (const Vec2 corner : corners) {
-            middle = middle + share * corner;
+            middle = middle + (1.0 / static_cast<double>(corners.size())) * corner;
         }
         out.point_a = middle;
         out.point_b = middle;
         return out;
     }
+
+    Facing nearest = nearest_by_axis(pair_, pair_.axis(widths.widest));
+    // Between two vertices no axis has all of the distance.
+    const auto lower_by = [&](const Facing& facing) {
+        return facing.amid || facing.square == 0.0
+                   ? widths.lower
+                   : std::max(widths.lower, gap_along(pair_, unit(facing.way)));
+    };
+    float lower = lower_by(nearest);
+    if (PowerOfTwo(pair_.down()) * nearest.length() > lower + kWideInterval && !places.walks()) {
+        // Of axes that are nearly parallel float finds one, not always that of the distance.
+        nearest = nearest_of_all(places);
+        lower = std::max(lower, lower_by(nearest));
+    }
     // No two points of the polygons are nearer to each other than these.
-    const Facing facing = facing_points(pair_, axis);
-    out.point_a = facing.points[0];
-    out.point_b = facing.points[1];
-    const double length = facing.length();
-    const double error = facing.amid ? kFootError * places.reach() : 0.0;
-    const double most = facing.coincide() ? 0.0 : (1.0 + kWayError) * length + (error + kPairUnderflow);
+    const double length = nearest.length();
+    const double error = nearest.amid ? kFootError * places.reach() : 0.0;
+    const double most = nearest.coincide() ? 0.0 : (1.0 + kWayError) * length + (error + kPairUnderflow);
+    out.point_a = nearest.points[0];
+    out.point_b = nearest.points[1];
     out.upper = most > 0.0 ? next_up(unit_length * most) : 0.0;
-    if (apart) {
-        out.normal = unit(facing.way);
-        // Between two vertices no axis has all of the distance.
-        const float least = facing.amid ? widths.lower : std::max(widths.lower, gap_along(pair_, out.normal));
-        out.lower = std::max(0.0, next_down(single_unit * least));
+    if (lower > 0.0F) {
+        out.normal = unit(nearest.way);
+        out.lower = std::max(0.0, next_down(single_unit * lower));
         out.distance = std::clamp(unit_length * length, out.lower, out.upper);
         return out;
     }
+    const bool has_edges = widths.edge_width > -kInfinity;
+    out.meet = true;
     out.certain = most == 0.0;
+    out.normal = outward_normal(places, pair_.axis(has_edges ? widths.widest_edge : widths.widest));
     if (penetration) {
         out.lower = std::min(next_down(single_unit * widths.lower), 0.0);
         out.distance = has_edges ? std::clamp(single_unit * widths.edge_width, out.lower, 0.0) : 0.0;
