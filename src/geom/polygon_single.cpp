@@ -67,6 +67,9 @@ constexpr double kShortestAxis = 0x1p-960;
 // kSingleRoundoff.
 constexpr float kWideInterval = 256.0F * kSingleRoundoff;
 
+// A place this far from an edge, in units of its length, is not beside it: float does not know places better.
+constexpr double kBeside = 0x1p-20;
+
 // Shorter lengths are lost when squared.
 constexpr double kShortest = 0x1p-400;
 
@@ -274,6 +277,12 @@ Vec2 outward_normal(const PolygonPair& pair, AxisOf axis) {
     return axis.side == 0 ? outward : -outward;
 }
 
+/// Heights along an axis, or places along its edge, that differ by less are the same to float.
+double level_of(const PolygonPair& pair, Vec2 axis) {
+    const double size = std::fabs(axis.x) + std::fabs(axis.y);
+    return 2.0 * (kSingleGapError * kSingleRoundoff) * pair.reach() * size + kPairUnderflow;
+}
+
 /// A vertex and where it lies along the contact line.
 struct Mark {
     int side;
@@ -298,8 +307,7 @@ ContactMarks contact_marks(const SinglePair& single, AxisOf axis, Vec2 velocity,
     const Vec2 outward = own.axis(axis.index);
     const Vec2 along{-outward.y, outward.x};
     const double drift = dot(along, velocity);
-    const double size = std::fabs(outward.x) + std::fabs(outward.y);
-    const double level = 2.0 * (kSingleGapError * kSingleRoundoff) * pair.reach() * size + kPairUnderflow;
+    const double level = level_of(pair, outward);
     const auto mark = [&](int side, std::size_t vertex) -> Mark {
         return {side, vertex, dot(along, pair.side(side).local(vertex)) + (side == 1 ? moment * drift : 0.0)};
     };
@@ -465,43 +473,72 @@ Facing nearest_of_all(const PolygonPair& pair) {
     return found;
 }
 
-/// Points over each other of polygons that overlap, on the edge of the axis and on the other polygon.
-Facing deepest_points(const SinglePair& single, AxisOf axis) {
-    const PolygonPair& pair = single.places();
+/// Points over each other of polygons that overlap, on the edge of the axis and on the other polygon near its
+/// lowest vertex; false if there are none.
+bool deepest_by_axis(const PolygonPair& pair, AxisOf axis, std::size_t lowest, std::array<Vec2, 2>& points) {
     const PairedPolygon& own = pair.side(axis.side);
     const PairedPolygon& other = pair.other(axis.side);
     const Vec2 start = own.ring[axis.index];
     const Vec2 edge = pair.way(start, own.ring[own.next(axis.index)]);
     const double square = dot(edge, edge);
-    const auto place_of = [&](std::size_t j) {
-        return square > 0.0 ? dot(pair.way(start, other.ring[j]), edge) / square : 0.0;
-    };
-    std::size_t vertex = lowest_vertex(single, axis).vertex;
+    const auto place_of = [&](std::size_t j) { return dot(pair.way(start, other.ring[j]), edge) / square; };
+    std::size_t vertex = lowest;
     double at = place_of(vertex);
-    // Beside the edge only where, up to rounding, others are as low: somewhere on the way along them.
     const double place = std::clamp(at, 0.0, 1.0);
-    double share = 0.0;
+    // A vertex beside the edge is the lowest only where, up to rounding, those on the way to the edge are,
+    // too.
     std::size_t next = vertex;
-    for (std::size_t steps = 0; at != place && share == 0.0 && steps < other.edges; ++steps) {
-        next = place == 1.0 ? other.next(vertex) : other.previous(vertex);
+    double share = 0.0;
+    for (std::size_t steps = 0; std::fabs(at - place) > kBeside && steps < other.edges; ++steps) {
+        next = at > place ? other.next(vertex) : other.previous(vertex);
         const double to = place_of(next);
-        if (std::fabs(to - place) >= std::fabs(at - place) && (to > place) == (at > place)) {
-            next = vertex;  // it turns back
-            break;
-        }
-        if ((to > place) != (at > place)) {
+        if ((to - place) * (at - place) <= 0.0) {
             share = (place - at) / (to - at);
-        } else {
+            at = place;
+        } else if (std::fabs(to - place) < std::fabs(at - place)) {
             vertex = next;
             at = to;
+        } else {
+            break;
         }
     }
-    const Vec2 way = pair.way(other.ring[vertex], other.ring[next]);
-    const Vec2 opposite = share > 0.0 ? on_edge(pair, other.ring[vertex], way, share) : other.ring[vertex];
+    const Vec2 outward = own.axis(axis.index);
+    const auto height = [&](std::size_t j) { return dot(outward, other.local(j)); };
+    const double rise = height(vertex) + share * (height(next) - height(vertex)) - height(lowest);
+    const Vec2 from = other.ring[vertex];
     const Vec2 foot = on_edge(pair, start, edge, place);
-    Facing found;
-    found.points = axis.side == 0 ? std::array{foot, opposite} : std::array{opposite, foot};
-    return found;
+    const Vec2 opposite = share > 0.0 ? on_edge(pair, from, pair.way(from, other.ring[next]), share) : from;
+    points = axis.side == 0 ? std::array{foot, opposite} : std::array{opposite, foot};
+    return std::fabs(at - place) <= kBeside && rise <= level_of(pair, outward);
+}
+
+/// Likewise; if need be on another edge whose width is the largest up to the rounding of float.
+std::array<Vec2, 2> deepest_points(const SinglePair& single, AxisOf& axis) {
+    const PolygonPair& pair = single.places();
+    std::array<Vec2, 2> points;
+    const std::size_t lowest = lowest_vertex(single, axis).vertex;
+    if (deepest_by_axis(pair, axis, lowest, points) || pair.walks()) {
+        return points;
+    }
+    const auto width_of = [&](AxisOf at, std::size_t vertex) {
+        const Vec2 outward = pair.side(at.side).axis(at.index);
+        const double low = dot(outward, pair.other(at.side).local(vertex));
+        return (low - pair.side(at.side).own(at.index)) / norm(outward);
+    };
+    const double widest = width_of(axis, lowest);
+    const double level = level_of(pair, {1.0, 1.0});
+    for (const int side : {0, 1}) {
+        for (std::size_t k = 0; k < pair.side(side).edges; ++k) {
+            const AxisOf other{side, k};
+            const std::size_t vertex = lowest_vertex(single, other).vertex;
+            std::array<Vec2, 2> found;
+            if (width_of(other, vertex) >= widest - level && deepest_by_axis(pair, other, vertex, found)) {
+                axis = other;
+                return found;
+            }
+        }
+    }
+    return points;
 }
 
 /// Lower bound of the distance by the gap along a direction from a to b.
@@ -675,21 +712,22 @@ PolygonDistance SinglePolygonDistanceSolver::solve(Ring a, Ring b, bool penetrat
     const PowerOfTwo unit_length(-places.scale_exponent());
     PolygonDistance out;
     if (widths.deep) {
-        const AxisOf axis = pair_.axis(widths.widest_edge);
+        AxisOf axis = pair_.axis(widths.widest_edge);
         out.meet = true;
         out.normal = outward_normal(places, axis);
         if (penetration) {
             out.lower = next_down(single_unit * widths.lower);
             out.upper = std::min(next_up(single_unit * widths.upper), 0.0);
             out.distance = std::clamp(single_unit * widths.edge_width, out.lower, out.upper);
-            const Facing deepest = deepest_points(pair_, axis);
-            out.point_a = deepest.points[0];
-            out.point_b = deepest.points[1];
+            const std::array<Vec2, 2> deepest = deepest_points(pair_, axis);
+            out.point_a = deepest[0];
+            out.point_b = deepest[1];
+            out.normal = outward_normal(places, axis);
             return out;
         }
         const std::span<const Vec2> corners = overlap_.of(places, {});
         // The mean of its corners lies inside a convex set.  Only what is too small to find has none.
-        Vec2 middle = corners.empty() ? deepest_points(pair_, axis).points[0] : Vec2{};
+        Vec2 middle = corners.empty() ? deepest_points(pair_, axis)[0] : Vec2{};
         for (const Vec2 corner : corners) {
             middle = middle + (1.0 / static_cast<double>(corners.size())) * corner;
         }
