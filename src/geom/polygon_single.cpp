@@ -214,7 +214,7 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
             const FloatLanes along_y = dy * FloatLanes(approach * velocity_y);
             const FloatLanes rate = along_x + along_y;
             const FloatLanes gap_off =
-                FloatLanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + FloatLanes(kSingleUnderflow);
+                FloatLanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + FloatLanes(pair.underflow());
             const FloatLanes rate_off =
                 FloatLanes(kSingleRateError) * (magnitude(along_x) + magnitude(along_y)) +
                 FloatLanes(underflow);
@@ -360,7 +360,7 @@ GEOMSRV_WIDE_CLONES SingleWidths widths_of(const SinglePair& pair) {
             const FloatLanes dy = FloatLanes::load(p.dy + k);
             const FloatLanes gap = FloatLanes::load(p.gap + k);
             const FloatLanes off =
-                FloatLanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + FloatLanes(kSingleUnderflow);
+                FloatLanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + FloatLanes(pair.underflow());
             const FloatLanes length = square_root(dx * dx + dy * dy);
             const FloatLanes local = places_from(k);
             const FloatLanes place = places_from(first + k);
@@ -547,7 +547,7 @@ float gap_along(const SinglePair& pair, Vec2 direction) {
     const auto dy = static_cast<float>(direction.y);
     const float high = -lowest_vertex(pair.side(0), -dx, -dy).height;
     const float low = lowest_vertex(pair.side(1), dx, dy).height;
-    const float off = pair.gap_error() * (std::fabs(dx) + std::fabs(dy)) + kSingleUnderflow;
+    const float off = pair.gap_error() * (std::fabs(dx) + std::fabs(dy)) + pair.underflow();
     const float width = (low - high - off) / std::sqrt(dx * dx + dy * dy);
     return width - kSingleWidthError * std::fabs(width);
 }
@@ -583,6 +583,8 @@ void SinglePair::load(Ring a, Ring b) {
     // One unit more than the reach of what has been rounded.
     const float rounded_reach = static_cast<float>(scale * reach) * (1.0F + 4.0F * kSingleRoundoff);
     gap_error_ = kSingleGapError * kSingleRoundoff * rounded_reach;
+    // Where all vertices are one point, every gap is exactly 0.
+    underflow_ = reach > 0.0 ? kSingleUnderflow : 0.0F;
     for (const int i : {0, 1}) {
         const PairedPolygon& from = places_.side(i);
         ProjectedPolygon<float>& to = sides_[static_cast<std::size_t>(i)];
@@ -767,7 +769,7 @@ PolygonDistance SinglePolygonDistanceSolver::solve(Ring a, Ring b, bool penetrat
     out.certain = most == 0.0;
     out.normal = outward_normal(places, pair_.axis(has_edges ? widths.widest_edge : widths.widest));
     if (penetration) {
-        out.lower = std::min(next_down(single_unit * widths.lower), 0.0);
+        out.lower = widths.lower < 0.0F ? next_down(single_unit * widths.lower) : 0.0;
         out.distance = has_edges ? std::clamp(single_unit * widths.edge_width, out.lower, 0.0) : 0.0;
     }
     return out;

@@ -35,8 +35,9 @@ public:
     [[nodiscard]] int down() const { return down_; }
     /// ... and the given ones times 2^exponent.
     [[nodiscard]] int exponent() const { return places_.scale_exponent() + down_; }
-    /// Error of a gap relative to |D|_1; add kSingleUnderflow.
+    /// Error of a gap relative to |D|_1; add the underflow.
     [[nodiscard]] float gap_error() const { return gap_error_; }
+    [[nodiscard]] float underflow() const { return underflow_; }
     /// The axis that queries count as this one: those of a, then, from the next whole block on, those of b.
     [[nodiscard]] AxisOf axis(float place) const;
 
@@ -46,6 +47,7 @@ private:
     std::vector<float> storage_;
     int down_ = 0;
     float gap_error_ = 0.0F;
+    float underflow_ = 0.0F;
 };
 
 class SingleFirstContactSolver {
