@@ -60,18 +60,18 @@ constexpr double kFootError = 32.0 * kUnitRoundoff;
 constexpr double kWayError = 8.0 * kUnitRoundoff;
 
 // The axes of edges that are shorter count as unknown: below 2^-1022 they are not even known in double.
-constexpr double kShortestAxis = 0x1p-960;
+constexpr double kShortestKnown = 0x1p-960;
 
 // An interval of a distance that is wider has not been found at the right places: rounding makes two gap
 // errors and two width errors of numbers up to 2 sqrt(8), 2 (15 sqrt(8) + 6 * 2 sqrt(8)) units of
 // kSingleRoundoff.
 constexpr float kWideInterval = 256.0F * kSingleRoundoff;
 
-// A place this far from an edge, in units of its length, is not beside it: float does not know places better.
+// A place is beside an edge if it is farther from it than this, in units of its length: some ulps of float.
 constexpr double kBeside = 0x1p-20;
 
 // Shorter lengths are lost when squared.
-constexpr double kShortest = 0x1p-400;
+constexpr double kShortestWay = 0x1p-400;
 
 constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
@@ -114,7 +114,7 @@ GEOMSRV_INLINE Lanes inverse_size(const Lanes& dx, const Lanes& dy) {
     constexpr std::int64_t kTwice = 0x7fe0000000000000;
     const Lanes size = greater(magnitude(dx), magnitude(dy));
     const Lanes inverse((Lanes::Vector)(kTwice - ((LaneMask::Vector)size.v & kExponent)));
-    return select(Lanes(kShortestAxis) < size, inverse, Lanes(0.0));
+    return select(Lanes(kShortestKnown) < size, inverse, Lanes(0.0));
 }
 
 /// Vertices times the scale, and axes, to float; and the gaps, if they are known.
@@ -257,8 +257,8 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
 
 /// Moved outwards over the rounding of a quotient.
 double before(double time) {
-    constexpr double kLargestFloat = std::numeric_limits<float>::max();
-    return std::max(0.0, (1.0 - kTimeError) * std::min(time, kLargestFloat) - kTimeUnderflow);
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    return std::max(0.0, (1.0 - kTimeError) * std::min(time, kLargest) - kTimeUnderflow);
 }
 double after(double time) { return (1.0 + kTimeError) * time; }
 
@@ -422,7 +422,7 @@ struct Facing {
     }
     /// Length of the way.
     [[nodiscard]] double length() const {
-        return std::max(std::fabs(way.x), std::fabs(way.y)) > kShortest ? std::sqrt(square)
+        return std::max(std::fabs(way.x), std::fabs(way.y)) > kShortestWay ? std::sqrt(square)
                                                                         : std::hypot(way.x, way.y);
     }
     /// Takes the nearest points of an edge, of the polygon of that side, and a vertex of the other polygon,
