@@ -423,7 +423,7 @@ struct Facing {
     /// Length of the way.
     [[nodiscard]] double length() const {
         return std::max(std::fabs(way.x), std::fabs(way.y)) > kShortestWay ? std::sqrt(square)
-                                                                        : std::hypot(way.x, way.y);
+                                                                           : std::hypot(way.x, way.y);
     }
     /// Takes the nearest points of an edge, of the polygon of that side, and a vertex of the other polygon,
     /// if they are nearer to each other.
