@@ -184,7 +184,6 @@ struct SingleWindow {
     float exit;     ///< place of the axis of `leave`
     bool apart;     ///< certainly apart along some axis now
     bool parting;   ///< ... and certainly not approaching along it
-    bool unsure;    ///< perhaps apart along some axis, and perhaps not approaching along it
     bool deep;      ///< certainly overlapping along every axis now
 };
 
@@ -199,7 +198,6 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
     FloatLanes leaving = never;
     FloatLanes::Mask apart = never < zero;
     FloatLanes::Mask parting = apart;
-    FloatLanes::Mask unsure = apart;
     FloatLanes::Mask deep = ~apart;
     std::size_t first = 0;
     for (const int i : {0, 1}) {
@@ -231,7 +229,6 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
             const FloatLanes place = places_from(first + k);
             apart = apart | is_apart;
             parting = parting | (is_apart & ~may_close);
-            unsure = unsure | (may_be_apart & ~closes);
             deep = deep & (most < zero);
             enter.take(select(is_apart & may_close, least_time, zero), place);
             // An axis that never closes is closed already, if there is contact.
@@ -251,7 +248,6 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
             leave_back.where(),
             any(apart),
             any(parting),
-            any(unsure),
             all(deep)};
 }
 
@@ -654,7 +650,8 @@ FirstContact SingleFirstContactSolver::solve(const MovingPolygon& a, const Movin
                      ? std::min({time, entered, leave})
                      : enter;
         result.status = ContactStatus::will_touch;
-        result.certain = !window.unsure && entered <= before(window.leaving) && seconds.up(entered) <= t_max;
+        // An axis that may be apart and may not approach has either no latest time, or `leaving` is 0.
+        result.certain = entered <= before(window.leaving) && seconds.up(entered) <= t_max;
     } else {
         result.status = window.deep ? ContactStatus::overlapping : ContactStatus::touching;
         result.certain = window.deep;
