@@ -50,7 +50,8 @@ inline constexpr double kWalkError = 40.0;
 /// Below 2^-1022 results are rounded to multiples of 2^-1074; no bound here counts more than 16 of them.
 inline constexpr double kPairUnderflow = 0x1p-1070;
 
-/// One polygon of a pair: vertices relative to the origin of the pair, axes (but for tips) times its scale.
+/// One polygon of a pair: vertices relative to the origin of the pair, and edges, times its scale; gaps are
+/// -1 beyond the last axis.
 struct PairedPolygon : ProjectedPolygon<double> {
     Ring ring;  ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
     std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis

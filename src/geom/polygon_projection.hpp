@@ -22,7 +22,7 @@ struct ProjectedPolygon {
     Real* y = nullptr;
     Real* dx = nullptr;  ///< outward axes; zero beyond `axes`
     Real* dy = nullptr;
-    Real* gap = nullptr;  ///< support of the other polygon minus own; -1 beyond `axes`
+    Real* gap = nullptr;  ///< support of the other polygon minus own
 };
 
 /// As many as fill a register.

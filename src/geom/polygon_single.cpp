@@ -118,12 +118,13 @@ GEOMSRV_INLINE Lanes inverse_size(const Lanes& dx, const Lanes& dy) {
 }
 
 /// Vertices times the scale, and axes, to float; and the gaps, if they are known.
-GEOMSRV_WIDE_CLONES void round_polygon(const PairedPolygon& from, double scale, bool with_gaps,
-                                       const ProjectedPolygon<float>& to) {
+GEOMSRV_INLINE void round_polygon(const PairedPolygon& from, double scale, bool with_gaps,
+                                  const ProjectedPolygon<float>& to) {
     constexpr std::size_t kHalf = Lanes::kCount;
     const auto scaled = [&](const double* row, std::size_t i) __attribute__((always_inline)) {
         return joined(Lanes(scale) * Lanes::load(row + i), Lanes(scale) * Lanes::load(row + i + kHalf));
     };
+    const FloatLanes axes = static_cast<float>(from.axes);
     const std::size_t end = std::max(from.vertices, from.axes);
     for (std::size_t i = 0; i < end; i += kLanes) {
         scaled(from.x, i).store(to.x + i);
@@ -131,8 +132,9 @@ GEOMSRV_WIDE_CLONES void round_polygon(const PairedPolygon& from, double scale, 
         const Lanes dx = Lanes::load(from.dx + i), next_dx = Lanes::load(from.dx + i + kHalf);
         const Lanes dy = Lanes::load(from.dy + i), next_dy = Lanes::load(from.dy + i + kHalf);
         const Lanes unit = inverse_size(dx, dy), next_unit = inverse_size(next_dx, next_dy);
-        joined(unit * dx, next_unit * next_dx).store(to.dx + i);
-        joined(unit * dy, next_unit * next_dy).store(to.dy + i);
+        const FloatLanes::Mask is_axis = places_from(i) < axes;
+        select(is_axis, joined(unit * dx, next_unit * next_dx), FloatLanes(0.0F)).store(to.dx + i);
+        select(is_axis, joined(unit * dy, next_unit * next_dy), FloatLanes(0.0F)).store(to.dy + i);
         if (with_gaps) {
             joined(unit * (Lanes(scale) * Lanes::load(from.gap + i)),
                    next_unit * (Lanes(scale) * Lanes::load(from.gap + i + kHalf)))
@@ -141,9 +143,15 @@ GEOMSRV_WIDE_CLONES void round_polygon(const PairedPolygon& from, double scale, 
     }
 }
 
-GEOMSRV_WIDE_CLONES void project_both(const ProjectedPolygon<float>& a, const ProjectedPolygon<float>& b) {
-    project_all<float>(a, b);
-    project_all<float>(b, a);
+GEOMSRV_WIDE_CLONES void round_and_project(const PolygonPair& places, double scale, bool with_gaps,
+                                           const std::array<ProjectedPolygon<float>, 2>& to) {
+    for (const int i : {0, 1}) {
+        round_polygon(places.side(i), scale, with_gaps, to[static_cast<std::size_t>(i)]);
+    }
+    if (!with_gaps) {
+        project_all<float>(to[0], to[1]);
+        project_all<float>(to[1], to[0]);
+    }
 }
 
 /// Height of the lowest vertex along an axis, and which it is.
@@ -203,11 +211,13 @@ GEOMSRV_WIDE_CLONES SingleWindow window_of(const SinglePair& pair, float velocit
     for (const int i : {0, 1}) {
         const ProjectedPolygon<float>& p = pair.side(i);
         const float approach = i == 0 ? -1.0F : 1.0F;
-        // Beyond the last axis D is 0 and the gap -1: overlapping, for ever.
+        // Beyond the last axis D is 0; with a gap of -1 that is overlapping for ever.
+        const FloatLanes axes = static_cast<float>(p.axes);
         for (std::size_t k = 0; k < p.axes; k += kLanes) {
             const FloatLanes dx = FloatLanes::load(p.dx + k);
             const FloatLanes dy = FloatLanes::load(p.dy + k);
-            const FloatLanes gap = FloatLanes::load(p.gap + k);
+            const FloatLanes gap =
+                select(places_from(k) < axes, FloatLanes::load(p.gap + k), FloatLanes(-1.0F));
             const FloatLanes along_x = dx * FloatLanes(approach * velocity_x);
             const FloatLanes along_y = dy * FloatLanes(approach * velocity_y);
             const FloatLanes rate = along_x + along_y;
@@ -372,7 +382,7 @@ GEOMSRV_WIDE_CLONES SingleWidths widths_of(const SinglePair& pair) {
             upper = greater(upper, select(is_edge, select(is_axis, above, -nothing), nothing));
             widest.take(select(is_axis, width, nothing), place);
             edge.take(select(is_axis & is_edge, width, nothing), place);
-            deep = deep & (gap + off < zero);
+            deep = deep & (~(local < axes) | (gap + off < zero));
         }
         first += padded(p.axes);
     }
@@ -587,16 +597,8 @@ void SinglePair::load(Ring a, Ring b) {
         to.vertices = from.vertices;
         to.edges = from.edges;
         to.axes = from.axes;
-        round_polygon(from, scale, walks, to);
-        std::fill_n(to.dx + to.axes, kLanes - 1, 0.0F);
-        std::fill_n(to.dy + to.axes, kLanes - 1, 0.0F);
     }
-    if (!walks) {
-        project_both(sides_[0], sides_[1]);
-    }
-    for (const ProjectedPolygon<float>& p : sides_) {
-        std::fill_n(p.gap + p.axes, kLanes - 1, -1.0F);
-    }
+    round_and_project(places_, scale, walks, sides_);
 }
 
 AxisOf SinglePair::axis(float place) const {
