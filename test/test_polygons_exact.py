@@ -358,8 +358,8 @@ def test_times_beyond_the_doubles_are_times():
     assert contacts([(*scene[:4], math.nextafter(INF, 0.0))]).status[0] == gs.NEVER
 
 
-def large_scenes(rng):
-    for count_a, count_b in ((40, 33), (90, 12)):
+def large_scenes(rng, counts=((40, 33), (90, 12))):
+    for count_a, count_b in counts:
         rings = [
             hull(
                 np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n])
@@ -651,7 +651,7 @@ def test_float32_of_mixed_magnitudes(rng):
 
 
 def test_float32_of_large_polygons(rng):
-    for scene in large_scenes(rng):
+    for scene in large_scenes(rng, ((40, 33), (100, 90))):
         answers = single_answers(scene)
         check_single(scene, *answers)
         assert answers[0].certain[0] and answers[3].certain[0]

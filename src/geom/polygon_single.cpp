@@ -25,6 +25,10 @@ namespace geomsrv {
 namespace {
 
 constexpr std::size_t kLanes = FloatLanes::kCount;
+
+// All pairs of axis and vertex are projected up to this many: about where a walk takes as long.
+constexpr std::size_t kLargestProduct = 8192;
+
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -578,8 +582,8 @@ SinglePair::SinglePair(std::size_t largest_a, std::size_t largest_b) : places_(l
 
 void SinglePair::load(Ring a, Ring b) {
     places_.place(a, b);
-    // Those of large polygons, rounded, are as good as those of float.
-    const bool walks = places_.walks();
+    // Those of large polygons are found by walking, in double; rounded, they are as good as those of float.
+    const bool walks = places_.walks() && places_.side(0).edges * places_.side(1).edges > kLargestProduct;
     if (walks) {
         places_.project();
     }
