@@ -52,7 +52,7 @@ CULL_COUNTS = {
 # What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of shapes
+SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of solids
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -222,7 +222,8 @@ def first_contact(
         Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
         rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
         circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
-        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
+        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.  "float32" takes them
+        literally, too: NEVER and OVERLAPPING are certain; TOUCHING is all that it cannot tell from touching.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -261,7 +262,7 @@ def first_contact(
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
     end = _validate.limit(t_max, "t_max")
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -439,7 +440,7 @@ def _polygon_distance(
     a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
 ) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(

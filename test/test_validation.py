@@ -558,7 +558,7 @@ TIERS_ANSWERED = {
     "cull": EVERY,
     "distance_to_frustum": EVERY,
     "distance_to_frustum.2d": EVERY,
-    "first_contact": ("bound", "exact"),
+    "first_contact": EVERY,
     "distance": ("bound", "exact"),
     "distance.batches": ("bound", "exact"),
     "intersects": ("bound", "exact"),
