@@ -34,6 +34,7 @@ from distance_scenes import (
 from oracle import polytope, vectors
 
 import geomsrv as gs
+from geomsrv import _validate
 
 DEEP = ("penetration",)
 SOAK = 20 if os.environ.get("GEOMSRV_SOAK") else 1
@@ -85,7 +86,7 @@ def check(a: Any, b: Any, pose: np.ndarray | None, square: Fraction, radii: Frac
         assert deep.cost.counts["filter"] == 1
         seen["ok"] += deep.status[0] == gs.DistanceStatus.OK
         if deep.status[0] == gs.DistanceStatus.OK:
-            assert high - low <= WIDEST * reach, (high - low, reach, text)
+            assert high - low <= WIDEST * reach + 8 * 5e-324, (high - low, reach, text)
             assert abs(np.linalg.norm(deep.normal[0]) - 1.0) <= 4 * EPS, text
             gap = (deep.point_b[0] - deep.point_a[0] - value * deep.normal[0]) / reach
             assert np.abs(gap).max() <= POINTS, (gap, text)
@@ -183,6 +184,28 @@ def test_half_spaces_are_answered_as_by_doubles(rng: np.random.Generator) -> Non
 def test_other_pairs_are_unsupported(tier: str) -> None:
     answer = gs.distance(gs.Cylinder(1.0, 1.0), gs.Sphere(1.0), [9, 0, 0, 0, 0, 0, 1], accuracy=tier)
     assert answer.status[0] == gs.DistanceStatus.UNSUPPORTED and np.isnan(answer.distance[0])
+
+
+@pytest.mark.parametrize("size_a", [5e-324, 1e-300, 1.0, 1e300])
+@pytest.mark.parametrize("size_b", [1e-320, 1e-20, 1e20, 1e300])
+def test_sizes_from_one_end_of_the_number_range_to_the_other(size_a: float, size_b: float) -> None:
+    tetrahedron = np.concatenate([np.eye(3), np.zeros((1, 3))])
+    pairs: list[tuple[Any, Any]] = [
+        (gs.Sphere(size_a), gs.Sphere(size_b)),
+        (gs.Sphere(size_a), gs.Capsule(size_b, size_b)),
+        (gs.Capsule(size_a, size_b), gs.Capsule(size_b, size_a)),
+        (gs.Sphere(size_a), gs.Box([size_b] * 3)),
+        (gs.Box([size_a] * 3), gs.Box([size_b] * 3)),
+        (gs.Convex(tetrahedron * size_a), gs.Convex(tetrahedron * size_b)),
+        (gs.HalfSpace([0, 0, 1], size_a), gs.Box([size_b] * 3)),
+        (gs.HalfSpace([0, 0, 1], size_a), gs.Capsule(size_b, size_b)),
+        (gs.Convex(tetrahedron * size_a), gs.HalfSpace([0.6, 0, 0.8], size_b)),
+    ]
+    for (a, b), position, turn in itertools.product(pairs, (0.0, 1e-300, 1e300), ([0, 0, 0, 1.0], [0.6, 0, 0.8, 0])):
+        pose = np.array([position, 0.0, position / 3.0, *turn])
+        assert np.array_equal(pose, _validate.poses(pose)[0])
+        reach = 4.0 * (size_a + size_b) + 2.0 * position if max(size_a, size_b, position) < 1e300 else math.inf
+        check(a, b, pose, *truth(a, b, pose), reach)
 
 
 # ---------------------------------------------------------------------------------------------------- batches
@@ -320,3 +343,14 @@ def test_a_bound_of_spheres_is_their_distance() -> None:
         answer = gs.distance(ball, other, [*pose, 0, 0, 0, 1], accuracy="bound")
         assert expected - 64 * EPS * 8.0 <= answer.distance[0] <= expected, (pose, answer)
         assert not gs.intersects(ball, other, [*pose, 0, 0, 0, 1], accuracy="bound").value[0]
+
+
+def test_a_tiny_body_next_to_a_half_space_has_a_size() -> None:
+    """Its bounding radius is a root of squares, which are no numbers any more."""
+    for size in (1e-300, 1e-170, 1.0, 1e170, 1e300):
+        for body in (gs.Capsule(size / 4, 2 * size), gs.Box([size] * 3), gs.Convex(np.eye(3) * size)):
+            ground, pose = gs.HalfSpace([0, 0, 1], 0.0), [0, 0, size / 2, 0, 1, 0, 0]
+            answer = gs.distance(body, ground, pose, want=DEEP, accuracy="bound")
+            exact = gs.distance(body, ground, pose, want=DEEP)
+            assert -4.0 * size <= answer.distance[0] <= exact.distance[0]
+            assert gs.intersects(body, ground, pose, accuracy="bound").value[0]
