@@ -296,7 +296,7 @@ def distance(
     poses_ab : (n, 7) or (7,) float, optional
         Poses of b in a: x y z [m], qx qy qz qw.
     accuracy : str
-        Tier; see the numerics page.
+        Tier; see the numerics page.  "bound" is a lower bound, without nearest points.
     want : tuple of str
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
     certificates : bool

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 #include "geom/facet_axes.hpp"
 #include "geom/gjk.hpp"
@@ -44,10 +43,8 @@ Gjk deepest_points(const Body& a, const Body& b, Vec3 normal) {
     const double gap = lowest(b, normal).value - highest(a, normal).value;
     const Body apart = moved(b, normal, -gap);
     Gjk found = gjk(a, apart, normal);
-    if constexpr (std::is_same_v<Body, Core>) {
-        if (found.state == GjkState::stalled) {
-            found = gjk_wide(a, apart, normal);
-        }
+    if (found.state == GjkState::stalled) {
+        found = gjk_wide(a, apart, normal);
     }
     found.point_b = found.point_b + gap * normal;
     return found;
@@ -107,11 +104,8 @@ CoreSeparation depth(const Body& a, const Body& b, const Gjk& start, Stage stage
     return out;
 }
 
-}  // namespace
-
-Gjk points_along(const Core& a, const Core& b, Vec3 normal) { return deepest_points(a, b, normal); }
-
-CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
+template <class Body>
+CoreSeparation separation(const Body& a, const Body& b, bool penetration) {
     Stage stage = Stage::gjk;
     Gjk found = gjk(a, b, first_direction(a, b));
     if (found.state == GjkState::stalled) {
@@ -134,15 +128,16 @@ CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
     return from_gjk(a, b, found, stage);
 }
 
+}  // namespace
+
+Gjk points_along(const Core& a, const Core& b, Vec3 normal) { return deepest_points(a, b, normal); }
+
+CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
+    return separation(a, b, penetration);
+}
+
 CoreSeparation convex_convex(const SingleCore& a, const SingleCore& b, bool penetration) {
-    const Gjk found = gjk(a, b, first_direction(a, b));
-    const bool met = found.state == GjkState::enclosed || found.state == GjkState::contact;
-    if (met && !penetration) {
-        return sunk(a, b, found, Stage::gjk);
-    }
-    // Stalled without a direction that separates: the hull of the difference may still tell.
-    const bool deep = met || (found.state == GjkState::stalled && penetration && !(found.gap > 0.0));
-    return deep ? depth(a, b, found, Stage::gjk) : from_gjk(a, b, found, Stage::gjk);
+    return separation(a, b, penetration);
 }
 
 }  // namespace geomsrv

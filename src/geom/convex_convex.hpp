@@ -11,7 +11,7 @@ namespace geomsrv {
 /// With `penetration` overlapping cores get their depth; without it only a common point.
 CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration);
 
-/// The same in single precision: what that cannot finish has a wide interval.
+/// The same in single precision.
 CoreSeparation convex_convex(const SingleCore& a, const SingleCore& b, bool penetration);
 
 /// Deepest points along a normal: where a and b, moved out along it until they touch, have their nearest

@@ -412,4 +412,6 @@ Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start) {
 
 Gjk gjk_wide(const Core& a, const Core& b, Vec3 start) { return run<DoubleDouble>(a, b, start); }
 
+Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start) { return run<double>(a, b, start); }
+
 }  // namespace geomsrv

@@ -44,4 +44,7 @@ Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start);
 /// In double-double arithmetic, for what doubles cannot finish: needles and slivers.
 Gjk gjk_wide(const Core& a, const Core& b, Vec3 start);
 
+/// In double arithmetic on vertices and supports of single precision.
+Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start);
+
 }  // namespace geomsrv
