@@ -5,8 +5,8 @@
 // The algorithms and the proofs are those of double precision.  A bound that counts k roundings there,
 // k * kUnitRoundoff, counts as many here, k * kUnitRoundoff * kCoarseness: vertices, supports and directions
 // are found by the same operations in the same order.  What is done once per pair or facet with numbers found
-// so (the length between two witness points, a facet's plane) is done in double, where it costs the same and
-// rounds less than the bound allows.
+// so (a closed form, the length between two witness points, a facet's plane) is done in double, where it
+// costs the same and rounds less than the bound allows.
 #pragma once
 
 #include <cmath>
