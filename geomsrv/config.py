@@ -14,7 +14,7 @@ from typing import Any
 
 from geomsrv import _validate
 from geomsrv.errors import GeometryError
-from geomsrv.queries import SHAPE_TIERS
+from geomsrv.queries import TIERS
 
 __all__ = ["Config", "Setting", "settings"]
 
@@ -186,7 +186,7 @@ class Config:
             fault = setting.fault(getattr(self, item.name), item.default)
             if fault:
                 raise GeometryError(fault)
-        _validate.accuracy(self.accuracy, SHAPE_TIERS)
+        _validate.accuracy(self.accuracy, TIERS)
         if not self.camera_far > self.camera_near:
             raise GeometryError(f"camera.far must be > camera.near = {self.camera_near:g}, got {self.camera_far:g}")
         # Within float32 drift; what is left of it is normalised away.

@@ -30,7 +30,7 @@ from geomsrv.narrow_phase import (
     solid_distances,
 )
 from geomsrv.placement import laid_flat
-from geomsrv.queries import RUNGS, SHAPE_TIERS
+from geomsrv.queries import RUNGS, TIERS
 from geomsrv.shapes import Frustum, Shape
 from geomsrv.world import ShapeTable, World
 
@@ -173,7 +173,7 @@ def distance_of_two(
     """Distance of two solids with checked poses (2, 7) that are in no scene; None if they have to go the long way.
 
     The same as `listed_distances` of `world_of`, without what only longer lists need: the one pair of a small request
-    is answered in the time that the rest of the call takes anyway.  `accuracy` is one of `SHAPE_TIERS`.
+    is answered in the time that the rest of the call takes anyway.  `accuracy` is one of `TIERS`.
     """
     start = time.perf_counter_ns()
     model = _resting((a, b))
@@ -221,7 +221,7 @@ def listed_distances(
 ) -> ListedDistances:
     """Distances of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
     _distinct(world, pairs)
     _count(world, pairs, counts)
@@ -305,7 +305,7 @@ def listed_first_contacts(
 ) -> ListedContacts:
     """First contacts within `horizon` [s] of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     end = _validate.limit(horizon, "horizon")
     if _all_slide(world, pairs):
         return _sliding_polygons(world, pairs, end, tier, start)

@@ -52,7 +52,6 @@ CULL_COUNTS = {
 # What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of solids
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -306,7 +305,7 @@ def distance(
     poses_ab : (n, 7) or (7,) float, optional
         Poses of b in a: x y z [m], qx qy qz qw.
     accuracy : str
-        Tier; see the numerics page.
+        Tier; see the numerics page.  "bound" is a lower bound, without nearest points.
     want : tuple of str
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
     certificates : bool
@@ -341,7 +340,7 @@ def distance(
         found = _polygon_distance(a, b, signed, accuracy, start)[0]
         proven = _validate.certificates(certificates, found.cost.accuracy)
         return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
         answer, message = _batch_distance(a, b, signed, tier, certified), ""

@@ -27,7 +27,7 @@ from geomsrv.errors import GeometryError, SceneError
 from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, first_contact_rows
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
-from geomsrv.queries import SHAPE_TIERS, TIERS
+from geomsrv.queries import TIERS
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
 from geomsrv.visibility import Visibility, sight
@@ -515,7 +515,7 @@ class Scene:
         Arguments as for `distances`.
         """
         start = time.perf_counter_ns()
-        tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+        tier = _validate.accuracy(accuracy, TIERS)
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)
@@ -555,7 +555,7 @@ class Scene:
         """
         start = time.perf_counter_ns()
         limit = _validate.limit(horizon, "horizon")
-        tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+        tier = _validate.accuracy(accuracy, TIERS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
@@ -733,7 +733,7 @@ class Scene:
         want: Sequence[str],
         accuracy: str,
     ) -> PairDistances:
-        tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+        tier = _validate.accuracy(accuracy, TIERS)
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)

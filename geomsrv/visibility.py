@@ -17,7 +17,7 @@ from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, CullState, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import AABB_ROUNDING
 from geomsrv.narrow_phase import count_rungs
-from geomsrv.queries import CULL_COUNTS, CULL_STAGES, RUNGS, SHAPE_TIERS
+from geomsrv.queries import CULL_COUNTS, CULL_STAGES, RUNGS
 from geomsrv.shapes import (
     Box,
     Capsule,
@@ -168,8 +168,7 @@ def _gaps(
         answer = _core.distance_pairs(*pack(bodies), pairs, poses, deep, tier, frusta=own_numbers(bodies))
         rounding = np.zeros(len(shapes))
     else:
-        # The frustum as the hull of its corners, relative to its own origin.  Pairs have fewer tiers than boxes.
-        tier = tier if tier in SHAPE_TIERS else "float64"
+        # The frustum as the hull of its corners, relative to its own origin.
         corners = frustum.corners(frustum.origin)
         poses = poses.copy()
         poses[:, :3] -= frustum.origin

@@ -13,8 +13,8 @@ import pytest
 import yaml
 
 from geomsrv.config import Config, settings
-from geomsrv.errors import GeometryError, NotAvailableError
-from geomsrv.queries import SHAPE_TIERS
+from geomsrv.errors import GeometryError
+from geomsrv.queries import TIERS
 
 YAML = Path(__file__).resolve().parents[1] / "config" / "geomsrv.yaml"
 
@@ -109,10 +109,6 @@ def test_what_depends_on_each_other() -> None:
     assert Config().changed({"camera.near": 20.0, "camera.far": 30.0}).camera_near == 20.0
 
 
-@pytest.mark.parametrize("accuracy", ["bound", "float32", "float64", "exact"])
+@pytest.mark.parametrize("accuracy", TIERS)
 def test_the_tier_is_one_that_every_query_answers(accuracy) -> None:
-    if accuracy in SHAPE_TIERS:
-        assert Config().changed({"accuracy": accuracy}).accuracy == accuracy
-        return
-    with pytest.raises(NotAvailableError, match=f"accuracy='{accuracy}' is not available yet"):
-        Config().changed({"accuracy": accuracy})
+    assert Config().changed({"accuracy": accuracy}).accuracy == accuracy

@@ -21,7 +21,7 @@ import geomsrv as gs
 from geomsrv import _fcl_process, _fcl_supervisor, _judge, _validate, _witness, crosscheck, fcl_worker
 from geomsrv.answers import Cost, Distances
 from geomsrv.crosscheck import COMPARED, CrossCheck, Mode, SkipReason, cross_check_scene
-from geomsrv.queries import SHAPE_TIERS
+from geomsrv.queries import TIERS
 
 SCALE = 20 if os.environ.get("GEOMSRV_SOAK") else 1
 NOWHERE = np.full(3, np.nan)
@@ -468,7 +468,7 @@ def test_tiers_that_claim_too_little_are_not_compared(rng):
     scene = crowd(rng, 4)
     ball, pose = gs.Sphere(1.0), [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
     with CrossCheck("all") as check:
-        for tier in SHAPE_TIERS:
+        for tier in TIERS:
             asked = {"want": ("penetration",), "accuracy": tier}
             compared, near = tier in COMPARED, scene.distances(np.inf, **asked)
             assert check.submit_scene(scene, near) == compared * len(near)

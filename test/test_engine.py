@@ -10,7 +10,7 @@ import pytest
 import geomsrv as gs
 from geomsrv.config import Config
 from geomsrv.engine import CONTACTS, DISTANCES, MARKERS, VISIBLE, Engine
-from geomsrv.queries import SHAPE_TIERS
+from geomsrv.queries import TIERS
 
 EVERYTHING = frozenset({CONTACTS, DISTANCES, VISIBLE, MARKERS})
 SQUARE = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -151,7 +151,7 @@ def test_failures_are_counted(monkeypatch) -> None:
     assert engine.counters["evaluations failed"] == 1 and not engine.failing
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 def test_every_topic_is_answered_at_the_tier_of_the_configuration(tier) -> None:
     engine = make()
     engine.configure(Config().changed({"accuracy": tier}))

@@ -16,7 +16,7 @@ import geomsrv as gs
 from geomsrv.config import Config
 from geomsrv.engine import Engine
 from geomsrv.narrow_phase import relative_poses
-from geomsrv.queries import SHAPE_TIERS
+from geomsrv.queries import TIERS
 from geomsrv.ros import convert
 from geomsrv.ros.handlers import Handlers
 from geomsrv.verify import verify_lines
@@ -748,23 +748,20 @@ def test_services_answer_at_every_tier_that_the_query_answers(desk, tier) -> Non
             assert set(got.cost.stages) & {"bound", "filter", "wide", "exact", "uncertain"}
 
 
-@pytest.mark.parametrize("tier", ACCURACIES)
+@pytest.mark.parametrize("tier", TIERS)
 def test_all_pairs_at_every_tier(desk, tier) -> None:
     for service, fields in (("Distance", {"max_distance": 8.0}), ("FirstContact", {"horizon": 5.0})):
         got = desk.ask(service, select=ALL, accuracy=tier, **fields)
-        if tier not in SHAPE_TIERS:
-            assert got.status == NOT_AVAILABLE and repr(SHAPE_TIERS[0]) in got.message and is_empty(got)
-            continue
         assert got.cost.accuracy == tier and ("left", "right") in set(zip(got.ids_a, got.ids_b, strict=True))
         if service == "Distance":
             near = desk.engine.scene.distances(8.0, accuracy=tier)
             assert len(got.ids_a) == len(near) + len(near.unsupported)
     near = desk.ask("Distance", select=BY_IDS, ids_a=["box", "left"], accuracy=tier)
-    assert near.ids_b == ["ball", "right"] if tier in SHAPE_TIERS else near.status == NOT_AVAILABLE
+    assert near.ids_b == ["ball", "right"]
 
 
 def test_the_tier_of_the_configuration_is_the_default() -> None:
-    for tier in SHAPE_TIERS:
+    for tier in TIERS:
         desk = Desk(accuracy=tier)
         assert desk.ask("Distance", select=ALL, max_distance=1.0).cost.accuracy == tier
         assert desk.ask("Distance", select=ALL, accuracy="float64").cost.accuracy == "float64"

@@ -14,7 +14,6 @@ from std_srvs.srv import SetBool, Trigger
 
 import geomsrv as gs
 from geomsrv import msg, srv
-from geomsrv.queries import SHAPE_TIERS, TIERS
 from geomsrv.ros import convert
 from geomsrv.ros.node import SERVICES
 
@@ -160,31 +159,21 @@ def test_tiers(client, tier) -> None:
         "axes": box[3:12],
         "half_extents": box[12:],
     }
-    for kind, name, fields, answered in (
-        (srv.Cull, "cull", view, TIERS),
-        (srv.CullBatch, "cull_batch", batch, TIERS),
-        (srv.Distance, "distance", by_ids, SHAPE_TIERS),
-        (srv.Distance, "distance", {"select": srv.Distance.Request.INLINE, **pair}, SHAPE_TIERS),
-        (srv.Distance, "distance", {"select": srv.Distance.Request.ALL_PAIRS, "max_distance": 9.0}, SHAPE_TIERS),
-        (
-            srv.DistanceBatch,
-            "distance_batch",
-            {"kind_a": 101, "values_a": box, "kind_b": 101, "values_b": box},
-            SHAPE_TIERS,
-        ),
-        (srv.FirstContact, "first_contact", moving, SHAPE_TIERS),
-        (srv.FirstContactBatch, "first_contact_batch", ring, SHAPE_TIERS),
+    for kind, name, fields in (
+        (srv.Cull, "cull", view),
+        (srv.CullBatch, "cull_batch", batch),
+        (srv.Distance, "distance", by_ids),
+        (srv.Distance, "distance", {"select": srv.Distance.Request.INLINE, **pair}),
+        (srv.Distance, "distance", {"select": srv.Distance.Request.ALL_PAIRS, "max_distance": 9.0}),
+        (srv.DistanceBatch, "distance_batch", {"kind_a": 101, "values_a": box, "kind_b": 101, "values_b": box}),
+        (srv.FirstContact, "first_contact", moving),
+        (srv.FirstContactBatch, "first_contact_batch", ring),
     ):
         request = fields if kind is srv.Cull else kind.Request(accuracy=tier, **fields)
         got = client.call(kind, name, request)
-        if tier in answered:
-            assert got.status == got.OK and got.cost.accuracy == tier, (name, got.message)
-            continue
-        assert got.status == got.NOT_AVAILABLE and f"accuracy='{tier}' is not available yet" in got.message
-        assert all(repr(known) in got.message for known in answered)
-    if tier in SHAPE_TIERS:
-        got = client.call(srv.Distance, "distance", srv.Distance.Request(accuracy=tier, **by_ids))
-        assert list(got.lower) == list(got.distance) if tier == "bound" else list(got.distance) == [0.5]
+        assert got.status == got.OK and got.cost.accuracy == tier, (name, got.message)
+    got = client.call(srv.Distance, "distance", srv.Distance.Request(accuracy=tier, **by_ids))
+    assert list(got.lower) == list(got.distance) if tier == "bound" else list(got.distance) == [0.5]
 
 
 BAD = [

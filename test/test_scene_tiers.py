@@ -18,7 +18,7 @@ import geomsrv as gs
 from geomsrv.answers import ContactStatus
 from geomsrv.narrow_phase import relative_poses
 from geomsrv.pairwise import distance_of_two, listed_distances, listed_first_contacts
-from geomsrv.queries import RUNGS, SHAPE_TIERS, TIERS
+from geomsrv.queries import RUNGS, TIERS
 from geomsrv.world import gather
 
 INF = np.inf
@@ -94,7 +94,7 @@ def asked_alone(world, i, j, pose, **options):
 # ---------------------------------------------------------------------------------------------------- distance
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 @pytest.mark.parametrize("want", [("distance",), ("penetration",)])
 @pytest.mark.parametrize("make", [solids, rings])
 def test_distances_are_those_of_the_literal_pose(rng, tier, want, make) -> None:
@@ -139,7 +139,7 @@ def test_distances_are_those_of_the_literal_pose(rng, tier, want, make) -> None:
 def test_nothing_is_added_where_nothing_rounds() -> None:
     boxes = [gs.SceneObject(f"{k}", gs.Box([0.5, 0.25, 1.0]), (2.0 * k, 0.5 * k, 0.0, *UPRIGHT)) for k in range(4)]
     scene = scene_of(boxes)
-    for tier in SHAPE_TIERS:
+    for tier in TIERS:
         answer = scene.distances(INF, want=("penetration",), accuracy=tier)
         for pair, k in rows_of(answer).items():
             step = 2.0 * (int(pair[1]) - int(pair[0]))
@@ -164,7 +164,7 @@ def test_tiers_agree_about_the_same_scene(rng, make) -> None:
     exactly = scene.distances(limit, want=("penetration",), accuracy="exact")
     rows = rows_of(exactly)
     assert 5 < len(rows) < len(all_pairs(scene.world)) / 2
-    for tier in SHAPE_TIERS:
+    for tier in TIERS:
         answer = scene.distances(limit, want=("penetration",), accuracy=tier)
         for name in ("objects", "pairs", "candidates", "allowed", "unsupported"):
             assert answer.cost.counts[name] == exactly.cost.counts[name], (tier, name)
@@ -191,7 +191,7 @@ def test_a_bound_is_one_wherever_the_objects_may_be(rng, make) -> None:
     assert by_volumes.all() or kinds, "half spaces are their own volumes"
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 @pytest.mark.parametrize("make", [solids, rings])
 def test_the_nearest_pair(rng, tier, make) -> None:
     scene = scene_of(make(rng, 30, 6.0))
@@ -228,7 +228,7 @@ def test_exact_arithmetic_decides_what_float64_leaves_open() -> None:
         assert sum(nearest.cost.counts.get(name, 0) for name in RUNGS) == nearest.cost.counts["narrow box-box"] > 0
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 def test_listed_pairs_are_answered_as_by_the_scene(rng, tier) -> None:
     scene = scene_of([*solids(rng, 12), *(gs.SceneObject(f"f{o.id}", o.shape, o.pose) for o in rings(rng, 6))])
     world, pairs = scene.world, all_pairs(scene.world)
@@ -259,7 +259,7 @@ def test_listed_pairs_are_answered_as_by_the_scene(rng, tier) -> None:
 # ----------------------------------------------------------------------------------------------- first contact
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 @pytest.mark.parametrize("horizon", [0.0, 1.5, INF])
 def test_first_contacts_are_those_of_the_placed_rings(rng, tier, horizon) -> None:
     scene = scene_of(rings(rng))
@@ -287,7 +287,7 @@ def test_first_contacts_are_those_of_the_placed_rings(rng, tier, horizon) -> Non
     assert sum(rungs.values()) == (0 if tier == "float64" else len(pairs))
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 def test_uncertain_polygons_meet_within_the_interval(rng, tier) -> None:
     radius, horizon = 0.05, 3.0
     objects = rings(rng, 24, 3.5, uncertainty=radius)
@@ -319,7 +319,7 @@ def test_a_time_beyond_the_doubles_is_no_plausible_number() -> None:
         assert 0.0 <= answer.time_lower[0] < INF
 
 
-@pytest.mark.parametrize("tier", SHAPE_TIERS)
+@pytest.mark.parametrize("tier", TIERS)
 def test_what_is_in_contact_now_but_not_followed(tier) -> None:
     square, push = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]]), (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     spin = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -517,13 +517,13 @@ def test_a_tier_that_a_query_does_not_answer_is_named(rng) -> None:
     scene = scene_of(solids(rng, 4))
     world, pairs = scene.world, np.array([[0, 1]])
     queries = {
-        "distances": (partial(scene.distances, 1.0), SHAPE_TIERS),
-        "contacts": (scene.contacts, SHAPE_TIERS),
-        "nearest_pair": (scene.nearest_pair, SHAPE_TIERS),
-        "first_contacts": (partial(scene.first_contacts, 1.0), SHAPE_TIERS),
+        "distances": (partial(scene.distances, 1.0), TIERS),
+        "contacts": (scene.contacts, TIERS),
+        "nearest_pair": (scene.nearest_pair, TIERS),
+        "first_contacts": (partial(scene.first_contacts, 1.0), TIERS),
         "cull": (partial(scene.cull, WIDE), TIERS),
-        "listed_distances": (partial(listed_distances, world, pairs), SHAPE_TIERS),
-        "listed_first_contacts": (partial(listed_first_contacts, world, pairs, 1.0), SHAPE_TIERS),
+        "listed_distances": (partial(listed_distances, world, pairs), TIERS),
+        "listed_first_contacts": (partial(listed_first_contacts, world, pairs, 1.0), TIERS),
     }
     for name, (query, answered) in queries.items():
         for tier in gs._validate.ACCURACIES:

@@ -559,9 +559,9 @@ TIERS_ANSWERED = {
     "distance_to_frustum": EVERY,
     "distance_to_frustum.2d": EVERY,
     "first_contact": EVERY,
-    "distance": ("bound", "exact"),
-    "distance.batches": ("bound", "exact"),
-    "intersects": ("bound", "exact"),
+    "distance": EVERY,
+    "distance.batches": EVERY,
+    "intersects": EVERY,
 }  #: besides float64
 
 

@@ -177,7 +177,7 @@ class Handlers:
     @_answered()
     def cull(self, request: Any, response: Any) -> None:
         """Cull.srv."""
-        accuracy = self._quality(request, queries.TIERS)
+        accuracy = self._quality(request)
         self._allowed("cull")
         frustum, scene = self._frustum(request), self.engine.scene
         if request.select == INLINE:
@@ -318,7 +318,7 @@ class Handlers:
     @_answered()
     def cull_batch(self, request: Any, response: Any) -> None:
         """CullBatch.srv."""
-        accuracy = self._quality(request, queries.TIERS)
+        accuracy = self._quality(request)
         self._allowed("cull")
         frustum = convert.frustum_of(request.frustum)
         boxes = Boxes(
@@ -334,7 +334,7 @@ class Handlers:
     @_answered()
     def distance_batch(self, request: Any, response: Any) -> None:
         """DistanceBatch.srv."""
-        accuracy = self._quality(request, _validate.ACCURACIES)  # points have more tiers than shapes
+        accuracy = self._quality(request)  # points have more tiers than shapes
         want = self._want(request, "distance", "witness", "penetration")
         sides = [
             _side(getattr(request, f"kind_{s}"), getattr(request, f"values_{s}"), getattr(request, f"offsets_{s}"), s)
@@ -364,7 +364,7 @@ class Handlers:
     @_answered()
     def first_contact_batch(self, request: Any, response: Any) -> None:
         """FirstContactBatch.srv."""
-        accuracy = self._quality(request, _validate.ACCURACIES)  # polygons have more tiers than polytopes
+        accuracy = self._quality(request)  # polygons have more tiers than polytopes
         self._allowed("first_contact")
         want = self._want(request, "contact_set")
         dimension = request.dimension
@@ -396,11 +396,11 @@ class Handlers:
 
     # ---------------------------------------------------------------------------------------------------- requests
 
-    def _quality(self, request: Any, available: tuple[str, ...] = queries.SHAPE_TIERS) -> str:
-        """Tier asked for, by default that of the configuration; refused if it is not `available`."""
+    def _quality(self, request: Any) -> str:
+        """Tier asked for, by default that of the configuration."""
         if request.tolerance != 0.0:
             raise NotAvailableError(f"tolerance={request.tolerance:g} is not available yet; it must be 0")
-        return _validate.accuracy(request.accuracy or self.engine.config.accuracy, available)
+        return _validate.accuracy(request.accuracy or self.engine.config.accuracy, queries.TIERS)
 
     def _allowed(self, *effects: str) -> None:
         """Refuse what the configuration has switched off."""
