@@ -334,7 +334,7 @@ class Handlers:
     @_answered()
     def distance_batch(self, request: Any, response: Any) -> None:
         """DistanceBatch.srv."""
-        accuracy = self._quality(request)  # points have more tiers than shapes
+        accuracy = self._quality(request)
         want = self._want(request, "distance", "witness", "penetration")
         sides = [
             _side(getattr(request, f"kind_{s}"), getattr(request, f"values_{s}"), getattr(request, f"offsets_{s}"), s)
@@ -364,7 +364,7 @@ class Handlers:
     @_answered()
     def first_contact_batch(self, request: Any, response: Any) -> None:
         """FirstContactBatch.srv."""
-        accuracy = self._quality(request)  # polygons have more tiers than polytopes
+        accuracy = self._quality(request)
         self._allowed("first_contact")
         want = self._want(request, "contact_set")
         dimension = request.dimension
