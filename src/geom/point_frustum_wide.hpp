@@ -153,11 +153,11 @@ GEOMSRV_INLINE void residual(const DistanceFrame<Lanes, Sides>& frame, const Wid
                 // The roots of `project`, with the factor that they have in common taken out.
                 Lanes sum = z;
                 unrolled<Sides>([&](auto i) __attribute__((always_inline)) {
-                    constexpr SlopeChoice slope = Kinds::choice(s, t, i);
-                    if constexpr (slope.low) {
+                    constexpr SlopeChoice kSlope = Kinds::choice(s, t, i);
+                    if constexpr (kSlope.low) {
                         sum = Arithmetic::multiply_add(frame.side[i].low_slope, x[i], sum);
                     }
-                    if constexpr (slope.high) {
+                    if constexpr (kSlope.high) {
                         sum = Arithmetic::multiply_add(frame.side[i].high_slope, x[i], sum);
                     }
                 });
