@@ -158,6 +158,17 @@ class Motion:
         at_start = type(self.b)(*self.placed(np.arange(len(self)), 0.0))
         return first_contact(self.a, at_start, np.zeros_like(self.velocity), self.velocity, t_max=self.t_max, **how)
 
+    def ask_turning(self, **how: Any) -> FirstContacts:
+        """The same of bodies that turn."""
+        query: Callable[..., FirstContacts] = first_contact
+        if "angular_velocity_b" not in inspect.signature(query).parameters:
+            raise NotAvailableError("first contact of bodies that turn is not available yet")
+        at_start = type(self.b)(*self.placed(np.arange(len(self)), 0.0))
+        turning = {"angular_velocity_b": self.spin[:, 2] if self.planar else self.spin, "center_b": self.center}
+        return query(
+            self.a, at_start, np.zeros_like(self.velocity), self.velocity, t_max=self.t_max, **turning, **how
+        )  # fmt: skip
+
     def placed(self, rows: IntArray, time: FloatArray | float) -> tuple[FloatArray, IntArray]:
         """Vertices of the listed b at the given time, or times, and their offsets."""
         ring, offsets = gather(self.b.vertices, self.b.offsets, rows)
@@ -167,14 +178,17 @@ class Motion:
         at = self.center[rows] + self.velocity[rows] * np.reshape(time, (-1, 1))
         return ring + np.repeat(at, np.diff(offsets), axis=0), offsets
 
-    def overlap(self, rows: IntArray, time: FloatArray | float) -> BoolArray:
-        """Whether the listed pairs meet at the given time, or times; the engine's test at float64, not validated."""
+    def gap(self, rows: IntArray, time: FloatArray | float) -> FloatArray:
+        """How far apart the listed pairs are at the given time, or times; the engine's, at float64, not validated."""
         first, second = gather(self.a.vertices, self.a.offsets, rows), self.placed(rows, time)
         if self.planar:
-            meet: BoolArray = _core.distance_polygons(*first, *second, False)[7]
-            return meet
-        touch: BoolArray = _core.distance_world(first, second, False)[0] <= 0.0
-        return touch
+            return _core.distance_polygons(*first, *second, False)[0]
+        return _core.distance_world(first, second, False)[0]
+
+    def overlap(self, rows: IntArray, time: FloatArray | float) -> BoolArray:
+        """Whether the listed pairs meet at the given time, or times."""
+        meet: BoolArray = self.gap(rows, time) <= 0.0
+        return meet
 
 
 def rotations(vectors: FloatArray) -> FloatArray:
@@ -271,14 +285,17 @@ class Answers(NamedTuple):
     exact: Way
 
 
-def answers(query: Callable[..., Any], ask: Ask, read: Callable[[Any], Found]) -> Answers:
-    """Every tier that there is, of which a query refuses those that it lacks; and tolerances, if it takes one."""
+def answers(query: Callable[..., Any], ask: Ask, read: Callable[[Any], Found], *, by_tolerance: bool = True) -> Answers:
+    """Every tier that there is, of which a query refuses those that it lacks; and tolerances, if it takes one.
+
+    Without `by_tolerance` it takes one, but for other items than these.
+    """
 
     def way(name: str, family: str, **how: Any) -> Way:
         return Way(name, family, lambda block: Call(partial(ask, block, **how), read))
 
     tiers = tuple(way(tier, TIER, accuracy=tier) for tier in _validate.ACCURACIES)
-    takes = "tolerance" in inspect.signature(query).parameters
+    takes = by_tolerance and "tolerance" in inspect.signature(query).parameters
     return Answers((*tiers, *(way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if takes)), tiers[-1])
 
 
@@ -494,25 +511,42 @@ def fixed_step(step: float) -> Way:
     return Way(f"steps of {step:g} s", STEPS, prepare)
 
 
-FINE_STEPS = 2000  #: of the window, between which the truth of a motion is searched
-HALVINGS = 60  #: of such a step: below the spacing of doubles
+CLOSE_LENGTH = 1e-9  #: [m] gap at which the search for the very moment begins
+LONGEST_LENGTH = 1e-4  #: [s] of that search; what has not touched by then has passed by
+HALVINGS = 60  #: of an interval as short as that: below the spacing of doubles
 
 
-def _bisected(motion: Motion) -> Found:
-    """The same with fine steps, and the last one halved until nothing is left of it."""
-    time = _stepped(motion, motion.t_max / FINE_STEPS)
-    rows = np.flatnonzero(time > 0.0)
-    low, high = time[rows] - motion.t_max / FINE_STEPS, time[rows]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        meet = motion.overlap(rows, middle)
-        low, high = np.where(meet, low, middle), np.where(meet, middle, high)
-    lower = time.copy()
-    time[rows], lower[rows] = high, low
-    return Found(~np.isnan(time), time, lower, time)
+def _searched(motion: Motion) -> Found:
+    """The truth of a motion: advance by what no point can cross, then halve an interval until nothing is left of it.
+
+    Nothing is missed but a contact shorter than the last interval that followed a gap below `CLOSE_LENGTH`.
+    """
+    reach = np.maximum.reduceat(np.linalg.norm(motion.b.vertices, axis=1), motion.b.offsets[:-1])
+    speed = np.linalg.norm(motion.velocity, axis=1) + np.linalg.norm(motion.spin, axis=1) * reach
+    time, rows, close = np.zeros(len(motion)), np.arange(len(motion)), np.zeros(len(motion), bool)
+    while len(rows):
+        gap = motion.gap(rows, time[rows])
+        close[rows] = gap <= CLOSE_LENGTH
+        time[rows] += np.where(close[rows], 0.0, gap / speed[rows])
+        rows = rows[~close[rows] & (time[rows] <= motion.t_max)]
+    value = np.where(close & motion.overlap(np.arange(len(motion)), 0.0), 0.0, np.nan)
+    rows = np.flatnonzero(close & np.isnan(value))
+    length = CLOSE_LENGTH / speed[rows]
+    while len(rows):
+        low, high = time[rows], time[rows] + length
+        meet = motion.overlap(rows, high)
+        at, low, high = rows[meet], low[meet], high[meet]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            over = motion.overlap(at, middle)
+            low, high = np.where(over, low, middle), np.where(over, middle, high)
+        value[at] = np.where(high <= motion.t_max, high, np.nan)
+        rest = ~meet & (length < LONGEST_LENGTH)
+        rows, length = rows[rest], 2.0 * length[rest]
+    return Found(~np.isnan(value), value)
 
 
-BISECTED = Way(f"{FINE_STEPS} steps, bisected", OTHER, lambda motion: Call(partial(_bisected, motion), lambda x: x))
+SEARCHED = Way("advancement and bisection", OTHER, lambda motion: Call(partial(_searched, motion), lambda x: x))
 
 
 def as_polygons(sides: int) -> Way:
@@ -662,11 +696,10 @@ def _of_motion(crowd: Crowd, answer: PairContacts) -> Found:
         raise NotAvailableError(answer.message)
     count = len(crowd.shapes) // 2
     rows = np.array(answer.ids_a, dtype=object).astype(np.int64) // 2
-    hit, unsure, numbers = np.zeros(count, bool), np.zeros(count, bool), np.full((3, count), np.nan)
+    hit, numbers = np.zeros(count, bool), np.full((3, count), np.nan)
     hit[rows] = ~np.isin(answer.status, (ContactStatus.NEVER, ContactStatus.NOT_CONVERGED))
-    unsure[rows] = np.isinf(answer.time_upper)
     numbers[:, rows] = answer.time, answer.time_lower, answer.time_upper
-    return Found(hit, numbers[0], numbers[1], numbers[2], unsure)
+    return Found(hit, numbers[0], numbers[1], numbers[2])
 
 
 MOVED_PAIRS = Asked(lambda crowd, scene, how: scene.first_contacts(crowd.horizon, **how), _of_motion)

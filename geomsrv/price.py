@@ -29,7 +29,6 @@ from geomsrv._price_peers import COAL, FCL, FCL_CONTACT, FCL_MOTION
 from geomsrv._price_ways import (
     ALL_PAIRS,
     APPROXIMATION,
-    BISECTED,
     BOXES_SEEN,
     CLOSED_FORM,
     FEWER,
@@ -38,6 +37,7 @@ from geomsrv._price_ways import (
     MOVED_PAIRS,
     NEAR_PAIRS,
     PLANES_ONLY,
+    SEARCHED,
     SEEN,
     SIDES,
     VOLUME,
@@ -341,7 +341,8 @@ POINTS = answers(distance_to_frustum, Points.ask, read_distances)
 PAIRS = answers(distance, Pair.ask, read_distances)
 BATCHES = answers(distance, Batches.ask, read_distances)
 MEETINGS = answers(intersects, Batches.meet, read_booleans)
-MOTIONS = answers(first_contact, Motion.ask, read_contacts)
+MOTIONS = answers(first_contact, Motion.ask, read_contacts, by_tolerance=False)
+TURNING = answers(first_contact, Motion.ask_turning, read_contacts)
 
 FIXED_STEPS = tuple(map(fixed_step, STEPS_S))
 SIMPLER_SIGHTS = (SIGHT_UPRIGHT, PLANES_ONLY)
@@ -369,17 +370,19 @@ QUERIES: tuple[Query, ...] = (
     Query("intersects polygon-polygon, touching", "intersects", "", _touching_polygons, 2000,
           (*MEETINGS.ways, *SIMPLER_MEETINGS), (MEETINGS.exact,)),
     Query("first contact 2D", "first_contact", "s", partial(_motions, 2, False), 500,
-          (*MOTIONS.ways, *SIMPLER_MOTIONS, *FIXED_STEPS), (MOTIONS.exact, BISECTED)),
+          (*MOTIONS.ways, *SIMPLER_MOTIONS, *FIXED_STEPS), (MOTIONS.exact, SEARCHED)),
     Query("first contact 2D, discs", "first_contact", "s", _discs, 500,
           tuple(map(as_polygons, SIDES)), (CLOSED_FORM,)),
     Query("first contact 3D", "first_contact", "s", partial(_motions, 3, False), 200,
-          (*MOTIONS.ways, *SIMPLER_MOTIONS, *FIXED_STEPS, *FCL_MOTION), (MOTIONS.exact, BISECTED)),
-    Query("first contact 2D, turning", "Scene.first_contacts", "s", partial(_motions, 2, True), 200,
-          (*in_scene(MOVED_PAIRS), *FIXED_STEPS), (BISECTED,)),
-    Query("first contact 3D, turning", "Scene.first_contacts", "s", partial(_motions, 3, True), 100,
-          (*in_scene(MOVED_PAIRS), *FIXED_STEPS, *FCL_MOTION), (BISECTED,)),
+          (*MOTIONS.ways, *SIMPLER_MOTIONS, *FIXED_STEPS, *FCL_MOTION), (MOTIONS.exact, SEARCHED)),
+    Query("first contact 2D, turning", "first_contact", "s", partial(_motions, 2, True), 200,
+          (*TURNING.ways, *FIXED_STEPS), (SEARCHED,)),
+    Query("first contact 3D, turning", "first_contact", "s", partial(_motions, 3, True), 100,
+          (*TURNING.ways, *FIXED_STEPS, *FCL_MOTION), (SEARCHED,)),
     Query("scene step, first contact 2D", "Scene.first_contacts", "s", partial(_motions, 2, False), 200,
           (*in_scene(MOVED_PAIRS), *FIXED_STEPS), (MOTIONS.exact,)),
+    Query("scene step, first contact 2D, turning", "Scene.first_contacts", "s", partial(_motions, 2, True), 200,
+          (*in_scene(MOVED_PAIRS), *FIXED_STEPS), (SEARCHED,)),
     Query("scene step, distances", "Scene.distances", "m", _crowds, 300,
           (*NEAR_PAIRS.tiers(), NEAR_PAIRS.on_simpler("bounding ball", balled)), (NEAR_PAIRS.exact, ALL_PAIRS)),
     Query("scene step, cull", "Scene.cull", "", _crowds, 300,

@@ -34,8 +34,8 @@ from geomsrv._price_measure import (
     measure,
 )
 from geomsrv._price_ways import (
-    BISECTED,
     CLOSED_FORM,
+    SEARCHED,
     TIER,
     Discs,
     Motion,
@@ -263,7 +263,7 @@ def test_fixed_steps_are_late_and_tunnel() -> None:
     assert answer.hit.tolist() == [True] and answer.value.tolist() == [2.5]
     through = squares((3.3, 0.0), (-100.0, 0.0))  # in contact from 0.023 to 0.043 s
     assert ask(fixed_step(0.5), through).hit.tolist() == [False]
-    assert ask(BISECTED, through).value[0] == pytest.approx(0.023, abs=1e-15)
+    assert ask(SEARCHED, through).value[0] == pytest.approx(0.023, abs=1e-15)
     exact = answers(gs.first_contact, Motion.ask, lambda x: Found(x.status > 0, x.time)).exact
     assert ask(exact, through).value[0] == pytest.approx(0.023, abs=1e-15)
 
