@@ -152,7 +152,7 @@ class Effort(NamedTuple):
     turns: int  #: at least, for each way
 
 
-FULL = Effort(12, 1.0, 6.0, 12)
+FULL = Effort(6, 1.0, 3.0, 12)
 QUICK = Effort(3, 0.5, 0.4, 3)
 LEAST_ITEMS = 8  #: of a block
 

@@ -253,14 +253,15 @@ def _coal_pairs(tolerance: float, block: Any) -> Call:
         geometries.append(maker._made(shape.kind, packed.params[0].tolist(), packed.vertices))
     here = coal.Transform3s()
     turns = rotation_matrices(block.poses[:, 3:])
+    request = coal.DistanceRequest()
+    request.enable_signed_distance = block.signed
+    request.gjk_tolerance = request.epa_tolerance = tolerance
     there = [coal.Transform3s(turn, pose[:3]) for turn, pose in zip(turns, block.poses, strict=True)]
 
     def run() -> list[float]:
         found = []
         for transform in there:
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            request.enable_signed_distance = block.signed
-            request.gjk_tolerance = tolerance
+            result = coal.DistanceResult()
             found.append(coal.distance(geometries[0], here, geometries[1], transform, request, result))
         return found
 

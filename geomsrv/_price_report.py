@@ -125,7 +125,7 @@ def printed(prices: Sequence[Priced]) -> None:
     def show(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         out = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
         for k, name in enumerate(head):
-            out.add_column(name, justify="right" if k else "left", no_wrap=True)
+            out.add_column(name.replace(" ", "\n"), justify="right" if k else "left", no_wrap=True)
         for row in rows:
             out.add_row(*row)
         console.print(out)
@@ -245,7 +245,8 @@ def figure(priced: Priced) -> bytes:
     handles = [
         Line2D([], [], ls="", marker=LOOKS[f][1], color=LOOKS[f][0], mec="none", ms=8, label=f) for f in families
     ]
-    handles.append(Line2D([], [], color="0.45", lw=1.2, label="best for its time"))
+    if len(line) > 1:
+        handles.append(Line2D([], [], color="0.45", lw=1.2, label="best for its time"))
     if any(m not in best for m in drawn):
         handles.append(
             Line2D([], [], ls="", marker="o", color="0.3", alpha=PALE, mec="none", ms=8, label="pale: another beats it")
@@ -366,12 +367,12 @@ figures. The line joins the best for their time among the ways with the fewest w
 def page_markdown(prices: Sequence[Priced], images: str, about: str) -> str:
     """A page with all tables, and the figures in the folder `images`."""
     lines = ["# What accuracy costs", "", about, ""]
-    lines += [f"- **{name}**: {text}" for name, text in READING.items()]
+    lines += [f"- **{name}**: {' '.join(text.splitlines())}" for name, text in READING.items()]
     lines += ["", "## What the tiers cost", "", *_markdown(SUMMARY_HEAD, summary(prices))]
     for priced in prices:
         lines += ["", f"## {priced.query}", ""]
         if priced.measures:
-            lines += [f"![{UNITS[priced.unit]} against CPU time per item]({images}/{slug(priced.query)}.png)", ""]
+            lines += [f"![{priced.query}: error against CPU time per item]({images}/{slug(priced.query)}.png)", ""]
             lines += [*_markdown(HEAD, table(priced)), ""]
         lines += ["  \n".join(f"{line[0].upper()}{line[1:]}." for line in (_judged(priced), *_skipped(priced)))]
     return "\n".join(lines) + "\n"

@@ -443,14 +443,18 @@ def upright(boxes: Boxes) -> Boxes:
 
 
 def _planes_only(block: Sight) -> BoolArray:
-    """The six planes of the view, as most renderers do it: boxes beside an edge pass."""
+    """The six planes of the view, as most renderers do it: boxes beside an edge pass.
+
+    Sums by einsum, since a matrix product would run on more threads than the one whose time is taken.
+    """
     frustum, boxes = block.frustum, block.boxes
-    delta = (boxes.center - frustum.origin) @ frustum.axes.T
+    delta = np.einsum("nk,pk->np", boxes.center - frustum.origin, frustum.axes)
     edges = (boxes.axes @ frustum.axes.T) * boxes.half_extents[:, :, None]
     (l0, l1, u0, u1), near = frustum.bounds, frustum.near
     planes = np.array([[0, 0, -1], [0, 0, 1], [near, 0, -l1], [-near, 0, l0], [0, near, -u1], [0, -near, u0]], float)
     limit = np.array([-near, frustum.far, 0, 0, 0, 0])
-    visible: BoolArray = (delta @ planes.T - np.abs(edges @ planes.T).sum(axis=1) <= limit).all(axis=1)
+    middle, reach = np.einsum("nk,pk->np", delta, planes), np.abs(np.einsum("nik,pk->nip", edges, planes)).sum(axis=1)
+    visible: BoolArray = (middle - reach <= limit).all(axis=1)
     return visible
 
 

@@ -468,7 +468,8 @@ def explain(text: str, saved: list[Priced], step: Callable[[str, str], object] =
     lines = []
     for query in select(words):
         priced = known.get(query.name) or price([query], QUICK, step)[0]
-        lines.append(f"{query.name}, within {tolerance:g}{f' {query.unit}' if query.unit else ' of the answers'}")
+        unit = f" {query.unit} off" if query.unit else " of the answers wrong"
+        lines.append(f"{query.name}, at most {tolerance:g}{unit}")
         if not priced.measures:
             lines.append(f"  nothing answers it: {'; '.join(priced.skipped.values())}")
             continue
@@ -476,12 +477,10 @@ def explain(text: str, saved: list[Priced], step: Callable[[str, str], object] =
         if best is None:
             lines.append("  no way proves that")
         else:
-            lines.append(f"  {_told(best)}, proven to {best.proven:.2g} {query.unit}".rstrip())
+            lines.append(f"  {_told(best)}; proven: at most {best.proven:.2g}{unit}")
         if lucky is not None and lucky != best:
-            lines.append(
-                f"  not proven, but never off by more than {lucky.worst:.2g} {query.unit}".rstrip()
-                + f" in {lucky.items:,} items: {_told(lucky)}"
-            )
+            seen = f"at most {lucky.worst:.2g}{unit} in {lucky.items:,} items"
+            lines.append(f"  {_told(lucky)}; not proven, but seen: {seen}")
     return lines
 
 

@@ -356,7 +356,7 @@ def test_explain_reads_what_was_saved(run: Path, capsys: pytest.CaptureFixture[s
     monkeypatch.setattr(price, "measure", lambda *a, **k: pytest.fail("measured again"))
     assert main(["price", "--explain", "distance box-sphere apart 1e-6", "--out", str(run / "figures")]) == 0
     told = capsys.readouterr().out
-    assert told.startswith(f"{ONE}, within 1e-06 m\n  float64: ") and "proven to" in told
+    assert told.startswith(f"{ONE}, at most 1e-06 m off\n  float64: ") and "proven: at most" in told
     assert main(["price", "--explain", "distance box-sphere apart 1e-30", "--json", str(run / "copy.json")]) == 0
     assert "no way proves that" in capsys.readouterr().out
 
