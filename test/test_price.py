@@ -114,14 +114,14 @@ def found(values: list[float], half: float = 0.25) -> Found:
 
 
 def test_errors_of_a_way_that_is_wrong_in_known_places() -> None:
-    truth = [found([1.0, 2.0, 0.0, 3.0]), found([0.0, 5.0])]
-    #               right, off by 0.5, a miss, a false alarm; right, off by 0.125
-    told = [found([1.0, 2.5, 1.0, 0.0]), found([0.0, 4.875])]
+    truth = [found([1.0, 2.0, 0.0, 3.0, -1.0]), found([0.0, 5.0])]
+    #               right, off by 0.5, a miss, a false alarm, another miss; right, off by 0.125
+    told = [found([1.0, 2.5, 1.0, 0.0, 0.5]), found([0.0, 4.875])]
     worst, p99, proven, false_alarms, misses, unsure = errors(told, truth, "m")
-    assert (worst, false_alarms, misses, unsure, proven) == (3.0, 1, 1, 2, 0.25)
-    assert p99 == np.percentile([0.0, 0.5, 1.0, 3.0, 0.0, 0.125], 99)
+    assert (worst, false_alarms, misses, unsure, proven) == (3.0, 1, 2, 2, 0.25)
+    assert p99 == np.percentile([0.0, 0.5, 1.0, 3.0, 1.5, 0.0, 0.125], 99)
     share, none, unproven, *rest = errors(told, truth, "")
-    assert share == 2 / 6 and math.isnan(none) and unproven == 2 / 6 and rest == [1, 1, 2]
+    assert share == 3 / 7 and math.isnan(none) and unproven == 2 / 7 and rest == [1, 2, 2]
 
 
 def test_numbers_that_one_of_both_lacks_count_as_wrong_answers_only() -> None:
