@@ -8,6 +8,7 @@ only a choice of two solvers; for motion it has a tolerance of time.
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import signal
 from collections.abc import Callable, Sequence
@@ -50,6 +51,7 @@ def survives(run: Callable[[], Any]) -> str:
     child = os.fork()
     if child == 0:  # nothing but the call happens here
         try:
+            faulthandler.disable()
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
             signal.alarm(PATIENCE_S)
             sink = os.open(os.devnull, os.O_WRONLY)
