@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from geomsrv import _core, _validate
 from geomsrv.answers import (
     Booleans,
-    ContactStatus,
     Cost,
     Cull,
     Distances,
@@ -187,8 +186,8 @@ def distance_to_frustum(
 
 
 def first_contact(
-    a: Polygons | Polytopes,
-    b: Polygons | Polytopes,
+    a: Polygons | Polytopes | Boxes,
+    b: Polygons | Polytopes | Boxes,
     velocity_a: ArrayLike,
     velocity_b: ArrayLike,
     *,
@@ -201,7 +200,7 @@ def first_contact(
 
     Parameters
     ----------
-    a, b : Polygons (2D) or Polytopes (3D)
+    a, b : Polygons (2D), Polytopes or Boxes (3D)
         n against n, or one against n.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame.
@@ -220,7 +219,6 @@ def first_contact(
     Returns
     -------
     FirstContacts
-        Polytopes answer UNSUPPORTED in this version.
 
     Raises
     ------
@@ -229,8 +227,8 @@ def first_contact(
 
     References
     ----------
-    Book section 7.7 for the times; the contact set is derived from support features, because the printed labels fail
-    on rotated shapes.
+    Book sections 7.7 and 11.11 for the times; the contact set is derived from support features, because the printed
+    labels fail on rotated shapes.
 
     Examples
     --------
@@ -242,40 +240,32 @@ def first_contact(
     (array([2.]), array([4.]), array([[1., 0.]]), [[3.0, 0.5], [3.0, 1.0]])
     """
     start = time.perf_counter_ns()
-    _expect(a, (Polygons, Polytopes), "a")
-    _expect(b, type(a), "b")
+    _expect(a, (Polygons, Polytopes, Boxes), "a")
+    _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
     count = _common_length(len(a), len(b))
-    d = a.dimension
+    d = 2 if isinstance(a, Polygons) else 3
     moving_a, moving_b = (
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
-    if isinstance(a, Polytopes):
-        nothing = np.full(count, np.nan)
-        return FirstContacts(
-            np.full(count, ContactStatus.UNSUPPORTED, np.uint8),
-            nothing,
-            nothing.copy(),
-            nothing.copy(),
-            nothing.copy(),
-            np.full((count, d), np.nan),
-            np.zeros((0, d)),
-            np.zeros(count + 1, np.int64),
-            np.zeros(count, np.bool_),
-            Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
-            "first contact of polytopes is unsupported in this version",
-            _record=proof,
+    if isinstance(a, Polygons) and isinstance(b, Polygons):
+        answer = _core.first_contact_polygons(
+            a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
         )
-    answer = _core.first_contact_polygons(
-        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
-    )
-    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
-    return FirstContacts(*answer[:-1], cost, _record=proof)
+        with np.errstate(over="ignore", invalid="ignore"):  # velocities may differ by more than the largest double
+            speed = -((moving_b - moving_a) * answer[5]).sum(axis=1)
+        cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
+        return FirstContacts(*answer[:-1], speed, cost, _record=proof)
+    side_a, side_b = (_side(cast(Boxes | Polytopes, body)) for body in (a, b))
+    found = _core.first_contact_world(side_a, side_b, moving_a, moving_b, end, bool(contact_set), tier)
+    # Of solids float64 decides some items by exact arithmetic, too: there the slack has the last word.
+    stages = _stages("exact" if tier == "float64" else tier, found[-1])
+    return FirstContacts(*found[:-1], Cost(time.perf_counter_ns() - start, tier, stages), _record=proof)
 
 
 def distance(

@@ -356,8 +356,9 @@ def test_first_contact_batch(desk) -> None:
         offsets_b=convert.uint32s([0, 1]),
         velocities_a=D([1, 0, 0]),
         velocities_b=D([0, 0, 0]),
+        t_max=10.0,
     )
-    assert solid.status == UNSUPPORTED and "polytopes" in solid.message and solid.item_status.tolist() == [4]
+    assert solid.status == OK and solid.item_status.tolist() == [1] and solid.time.tolist() == [3.0]
 
 
 # --------------------------------------------------------------------------------------------------- certificates

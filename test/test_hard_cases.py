@@ -67,9 +67,10 @@ def test_class(kind: str, group: str) -> None:
 
 KINDS = ("frustum_box", "point_frustum", "box_box_distance", "polygon2d_distance", "polygon2d_moving")
 CORPUS = [case for case in read(DATA / "hard_cases.jsonl") if case.kind in KINDS]
+SOLID_MOTIONS = [case for case in read(DATA / "hard_cases.jsonl") if case.kind == "polyhedra_moving"]
 
 
-@pytest.mark.parametrize("case", CORPUS, ids=[case.name for case in CORPUS])
+@pytest.mark.parametrize("case", CORPUS + SOLID_MOTIONS, ids=[case.name for case in CORPUS + SOLID_MOTIONS])
 def test_corpus(case: Case) -> None:
     check(case)
 
