@@ -520,8 +520,8 @@ class Scene:
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
-        Polygons in pure translation are followed; pairs at rest relative to each other touch now or never;
-        any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.
+        Polygons, boxes and hulls in pure translation are followed; pairs at rest relative to each other touch now or
+        never; any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.
 
         Parameters
         ----------
