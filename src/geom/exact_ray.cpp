@@ -317,18 +317,20 @@ bool ExactRay::surrounds(const Triangle& around) {
 }
 
 template <class F>
-void ExactRay::faces(const F& recipe, VertexPair level, std::vector<int>& of_a, std::vector<int>& of_b) {
+void ExactRay::faces(const F& recipe, const VertexPair* level, int count, std::vector<int>& of_a,
+                     std::vector<int>& of_b) {
     const Direction<F> direction(recipe, ordinary_);
     for (const bool b : {false, true}) {
         const ExactAndRough& body = b ? b_ : a_;
         const Core& core = body.rough;
-        const int base = b ? level.b : level.a;
+        const int base = b ? level[0].b : level[0].a;
+        const LevelCorners known(body.exact, b, level, count);
         const double doubt = kLevelError * core.reach + 2.0 * core.error;
         std::vector<int>& out = b ? of_b : of_a;
         out.clear();
         const Vec3 from = vertex_of(core, base);
         for (int i = 0; i < body.exact.count(); ++i) {
-            if (i != base) {
+            if (!known.holds(i)) {
                 if (std::fabs(dot(direction.rough(), vertex_of(core, i) - from)) > doubt) {
                     continue;
                 }
@@ -345,7 +347,8 @@ void ExactRay::faces(const F& recipe, VertexPair level, std::vector<int>& of_a, 
 }
 
 void ExactRay::faces(RayEnd end, std::vector<int>& of_a, std::vector<int>& of_b) {
-    faces([&]<class N>() { return support<N>(end); }, feature(end).corner[0], of_a, of_b);
+    const RayFeature& at = feature(end);
+    faces([&]<class N>() { return support<N>(end); }, at.corner, at.dimension + 1, of_a, of_b);
 }
 
 /// In the plane of the wall: the line is a point, K's face there a segment as seen along it.
@@ -353,7 +356,9 @@ bool ExactRay::meets_in_wall(VertexPair level) {
     {
         std::vector<int> of_a;
         std::vector<int> of_b;
-        faces([&]<class N>() { return wall_direction<N>(); }, level, of_a, of_b);
+        const VertexPair known[2] = {level, wall_.corner[0]};
+        const int count = wall_.kind == RayWall::Kind::corner ? 2 : 1;
+        faces([&]<class N>() { return wall_direction<N>(); }, known, count, of_a, of_b);
         among_a_ = std::move(of_a);
         among_b_ = std::move(of_b);
     }
@@ -416,7 +421,8 @@ void ExactRay::consider_all() {
 
 bool ExactRay::pierces(RayEnd end) {
     const RayFeature& at = feature(end);
-    return at.dimension == 2 && surrounds({{at.corner[0], at.corner[1], at.corner[2]}});
+    return pierced_[end == RayEnd::enter ? 0 : 1] ||
+           (at.dimension == 2 && surrounds({{at.corner[0], at.corner[1], at.corner[2]}}));
 }
 
 VertexPair ExactRay::lowest_along(const VectorOf<Exact>& direction, VertexPair start) {
@@ -439,6 +445,9 @@ VertexPair ExactRay::lowest_along(const VectorOf<Exact>& direction, VertexPair s
 bool ExactRay::meets(const LineCast& guess) {
     consider_all();
     wall_ = {};
+    wide_ = {};
+    whole_ = {};
+    pierced_[0] = pierced_[1] = false;
     const auto listed = [&](VertexPair pair) {
         return VertexPair{std::min(pair.a, a_.exact.count() - 1), std::min(pair.b, b_.exact.count() - 1)};
     };
@@ -450,7 +459,7 @@ bool ExactRay::meets(const LineCast& guess) {
     bool known = false;
     if (guess.portals) {
         around = guessed(guess.enter);
-        known = surrounds(around);
+        known = guess.enter.sure || surrounds(around);
     }
     if (!known) {
         switch (enclose(listed(guess.start), around)) {
@@ -463,14 +472,23 @@ bool ExactRay::meets(const LineCast& guess) {
                 break;
         }
     }
+    const auto same = [](const Triangle& x, const RayFeature& y) {
+        const auto equal = [&](int k) {
+            return x.corner[k].a == y.corner[k].a && x.corner[k].b == y.corner[k].b;
+        };
+        return equal(0) && equal(1) && equal(2);
+    };
+    const Triangle first = around;
     enter_ = descend(around, RayEnd::enter);
+    pierced_[0] = guess.portals && guess.enter.sure && same(first, enter_);
     if (guess.portals) {
         const Triangle other = guessed(guess.leave);
-        if (surrounds(other)) {
+        if (guess.leave.sure || surrounds(other)) {
             around = other;
         }
     }
     leave_ = descend(around, RayEnd::leave);
+    pierced_[1] = guess.portals && guess.leave.sure && same(around, leave_);
     return true;
 }
 

@@ -128,7 +128,8 @@ public:
 
 private:
     template <class F>
-    void faces(const F& direction, VertexPair level, std::vector<int>& of_a, std::vector<int>& of_b);
+    void faces(const F& direction, const VertexPair* level, int count, std::vector<int>& of_a,
+               std::vector<int>& of_b);
     enum class Place : std::uint8_t { outside, border, inside };
     template <class F>
     class Direction;
@@ -136,6 +137,24 @@ private:
         VertexPair corner[3];
     };
 
+    /// What has been computed of either end.
+    template <class N>
+    struct Known {
+        std::optional<VectorOf<N>> direction[2];
+        std::optional<N> numerator[2];
+        std::optional<N> denominator[2];
+    };
+    template <class N>
+    [[nodiscard]] Known<N>& known() const {
+        if constexpr (std::is_same_v<N, Enclosed>) {
+            return wide_;
+        } else {
+            return whole_;
+        }
+    }
+
+    template <class N>
+    [[nodiscard]] VectorOf<N> vertex(int body, int index) const;
     template <class N>
     [[nodiscard]] VectorOf<N> direction(const RayWall& wall) const;
     template <class N>
@@ -168,6 +187,11 @@ private:
     RayWall wall_;
     RayFeature enter_;
     RayFeature leave_;
+    bool pierced_[2] = {};  ///< known to pass strictly between the corners
+    mutable Known<Enclosed> wide_;
+    mutable Known<Exact> whole_;
+    mutable VectorOf<Enclosed> box_vertex_[2][8];
+    mutable int box_vertices_[2] = {};  ///< bits of those known
     std::vector<int> among_a_;
     std::vector<int> among_b_;
 };
@@ -184,7 +208,22 @@ VectorOf<N> ExactRay::ray() const {
 
 template <class N>
 VectorOf<N> ExactRay::corner(VertexPair pair) const {
-    return vertex_times_denominator<N>(b_.exact, pair.b) - vertex_times_denominator<N>(a_.exact, pair.a);
+    return vertex<N>(1, pair.b) - vertex<N>(0, pair.a);
+}
+
+template <class N>
+VectorOf<N> ExactRay::vertex(int body, int index) const {
+    const ExactBody& of = body == 0 ? a_.exact : b_.exact;
+    if constexpr (std::is_same_v<N, Enclosed>) {
+        if (of.kind == ExactBody::Kind::zonotope) {
+            if ((box_vertices_[body] >> index & 1) == 0) {
+                box_vertex_[body][index] = vertex_times_denominator<N>(of, index);
+                box_vertices_[body] |= 1 << index;
+            }
+            return box_vertex_[body][index];
+        }
+    }
+    return vertex_times_denominator<N>(of, index);
 }
 
 template <class N>
@@ -215,16 +254,26 @@ VectorOf<N> ExactRay::direction(RayEnd end, const RayFeature& feature) const {
 
 template <class N>
 VectorOf<N> ExactRay::direction(RayEnd end) const {
-    return direction<N>(end, feature(end));
+    std::optional<VectorOf<N>>& found = known<N>().direction[end == RayEnd::enter ? 0 : 1];
+    if (!found) {
+        found = direction<N>(end, feature(end));
+    }
+    return *found;
 }
 
 template <class N>
 void ExactRay::time(RayEnd end, N& numerator, N& denominator) const {
-    const VectorOf<N> n = direction<N>(end);
-    const N gap = dot(n, corner<N>(feature(end).corner[0]));
-    const N rate = dot(n, ray<N>());
-    numerator = end == RayEnd::enter ? gap : -gap;
-    denominator = end == RayEnd::enter ? rate : -rate;
+    Known<N>& found = known<N>();
+    const int k = end == RayEnd::enter ? 0 : 1;
+    if (!found.numerator[k]) {
+        const VectorOf<N> n = direction<N>(end);
+        const N gap = dot(n, corner<N>(feature(end).corner[0]));
+        const N rate = dot(n, ray<N>());
+        found.numerator[k] = end == RayEnd::enter ? gap : -gap;
+        found.denominator[k] = end == RayEnd::enter ? rate : -rate;
+    }
+    numerator = *found.numerator[k];
+    denominator = *found.denominator[k];
 }
 
 }  // namespace geomsrv

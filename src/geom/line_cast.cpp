@@ -23,10 +23,11 @@ constexpr double kSettled = 2 * kCornerError;
 // Squared sine of an angle below which the product of two edges may have lost most of its digits.
 constexpr double kSliver = 0x1p-20;
 
-// Seen along the line, both coordinates of a vertex are off by 6 u of the reach (each end 3 u, core 1 u,
-// shear and differences 2 u), so an area, a product of two, by four times sqrt(2) as much, and 3 u of its
-// own.
-constexpr double kAreaError = 40 * kUnitRoundoff;
+// Seen along the line, a coordinate of a vertex is off by 14 u of the reach: 4 u for the part itself and for
+// the one along the line, 3 u for the slope, 3 u for product and difference; both by 20 u.  Slopes are at
+// most 1, so both together are no longer than twice the reach, and an area, a product of two, is off by 80 u,
+// and by 12 u of its own.
+constexpr double kAreaError = 128 * kUnitRoundoff;
 
 /// Highest of a hull's points along n, the first of several.
 GEOMSRV_INLINE int top_of_points(const Core& core, Vec3 n) {

@@ -79,8 +79,9 @@ inline Vec3 lowest_margin(Vec3 n, double margin) {
 inline constexpr double kCornerError = 10 * kUnitRoundoff;
 
 // The lowest vertex found may be higher than another by the rounding of both supports, 3 u of the spread
-// each; products with a common centre are not formed.
-inline constexpr double kLowestError = kCornerError + 6 * kUnitRoundoff;
+// each, and by that of the unit normal, 2 u for each of the two; products with a common centre are not
+// formed.
+inline constexpr double kLowestError = kCornerError + 12 * kUnitRoundoff;
 
 // Error of the rate, in terms of |w|: w 1 u, product 3 u, one to spare.
 inline constexpr double kPortalRateError = 5 * kUnitRoundoff;
