@@ -207,10 +207,11 @@ def first_contact(
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
-        Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
-        rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
-        circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
-        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
+        Tier; see the numerics page.  "float64" takes bodies that come within the rounding of coordinates for touching;
+        where exact arithmetic says otherwise, ``certain`` is False.  "exact" takes the numbers literally: no slack,
+        everything correctly rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound"
+        looks at boxes, circles and spheres only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can
+        first meet (TOUCHING if at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -219,6 +220,8 @@ def first_contact(
     Returns
     -------
     FirstContacts
+        ``cost.counts``: polygons by the tier's rungs; solids decided by the "filter" in float64, in "wide" arithmetic
+        (double-double) and in "exact" arithmetic, which "float64", too, turns to where bodies pass within the slack.
 
     Raises
     ------

@@ -16,8 +16,8 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "geom/core.hpp"
@@ -140,9 +140,11 @@ private:
     /// What has been computed of either end.
     template <class N>
     struct Known {
-        std::optional<VectorOf<N>> direction[2];
-        std::optional<N> numerator[2];
-        std::optional<N> denominator[2];
+        VectorOf<N> direction[2];
+        N numerator[2];
+        N denominator[2];
+        bool has_direction[2] = {};
+        bool has_time[2] = {};
     };
     template <class N>
     [[nodiscard]] Known<N>& known() const {
@@ -254,26 +256,29 @@ VectorOf<N> ExactRay::direction(RayEnd end, const RayFeature& feature) const {
 
 template <class N>
 VectorOf<N> ExactRay::direction(RayEnd end) const {
-    std::optional<VectorOf<N>>& found = known<N>().direction[end == RayEnd::enter ? 0 : 1];
-    if (!found) {
-        found = direction<N>(end, feature(end));
+    Known<N>& found = known<N>();
+    const int k = end == RayEnd::enter ? 0 : 1;
+    if (!found.has_direction[k]) {
+        found.direction[k] = direction<N>(end, feature(end));
+        found.has_direction[k] = true;
     }
-    return *found;
+    return found.direction[k];
 }
 
 template <class N>
 void ExactRay::time(RayEnd end, N& numerator, N& denominator) const {
     Known<N>& found = known<N>();
     const int k = end == RayEnd::enter ? 0 : 1;
-    if (!found.numerator[k]) {
+    if (!found.has_time[k]) {
         const VectorOf<N> n = direction<N>(end);
         const N gap = dot(n, corner<N>(feature(end).corner[0]));
         const N rate = dot(n, ray<N>());
         found.numerator[k] = end == RayEnd::enter ? gap : -gap;
         found.denominator[k] = end == RayEnd::enter ? rate : -rate;
+        found.has_time[k] = true;
     }
-    numerator = *found.numerator[k];
-    denominator = *found.denominator[k];
+    numerator = found.numerator[k];
+    denominator = found.denominator[k];
 }
 
 }  // namespace geomsrv
