@@ -282,7 +282,7 @@ class FirstContacts(_Certified):
         True where exact arithmetic is proven to give the same ``status``.
     closing_speed : (n,) float64
         Speed along the normal at which the bodies approach at ``time`` [m/s], < 0 where they part; NaN where there is
-        no normal.
+        no normal.  Of polygons it is that along ``normal`` as it stands, in float64.
     message : str
         Names what is unsupported; empty otherwise.
     cost : Cost

@@ -241,6 +241,14 @@ def first_contact(
     >>> hit = gs.first_contact(square, other, (1.0, 0.0), (0.0, 0.0))
     >>> hit.time, hit.last_time, hit.normal, hit.points.tolist()
     (array([2.]), array([4.]), array([[1., 0.]]), [[3.0, 0.5], [3.0, 1.0]])
+
+    In space boxes and hulls may be mixed:
+
+    >>> cube = gs.Boxes.from_poses([[0, 0, 0, 0, 0, 0, 1]], [[1, 1, 1]])
+    >>> point = gs.Polytopes.from_list([[(5, 0.5, 0)]])
+    >>> hit = gs.first_contact(cube, point, (1, 0, 0), (-1, 0, 0), accuracy="exact")
+    >>> hit.time, hit.normal.tolist(), hit.closing_speed, hit.points.tolist()
+    (array([2.]), [[1.0, 0.0, 0.0]], array([2.]), [[3.0, 0.5, 0.0]])
     """
     start = time.perf_counter_ns()
     _expect(a, (Polygons, Polytopes, Boxes), "a")

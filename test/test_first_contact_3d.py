@@ -536,8 +536,29 @@ def test_law_swap(batch):
     a, b, va, w = batch
     one, other = solve(a, b, va, va + w), solve(b, a, va + w, va)
     same(one, other, "closing_speed")
-    np.testing.assert_array_equal(other.normal, -one.normal)
+    sides = two_sided(one, other, -1.0)
+    np.testing.assert_array_equal(other.normal[~sides], -one.normal[~sides])
     same_points(one, other)
+
+
+def two_sided(one, other, sign):
+    """Flat bodies that slide along or rest on each other in one plane have two normals to choose from."""
+    sides = (one.closing_speed == 0.0) & (other.normal == -sign * one.normal).all(axis=1)
+    assert sides.sum() <= 0.02 * len(sides)
+    return sides
+
+
+def test_law_swap_of_degenerate_pairs(rng):
+    """Which normal it is where there are many is no matter of order, of bodies or of vertices."""
+    a, va, b, vb = zip(*(random_pair(rng, int(rng.integers(1, 4))) for _ in range(1500)), strict=True)
+    va, vb = np.array(va, float), np.array(vb, float)
+    one, other = solve(a, b, va, vb), solve(b, a, vb, va)
+    shuffled = solve([rng.permutation(x) for x in a], [rng.permutation(x) for x in b], va, vb)
+    for answer, sign in ((other, -1.0), (shuffled, 1.0)):
+        same(one, answer, "closing_speed")
+        sides = two_sided(one, answer, sign)
+        np.testing.assert_array_equal(answer.normal[~sides], sign * one.normal[~sides])
+    assert (one.status == gs.TOUCHING).sum() >= 50 and (one.closing_speed < 0.0).sum() >= 20
 
 
 def test_law_common_velocity(batch, rng):
@@ -557,7 +578,9 @@ def test_law_permuted_coordinates_and_vertices(batch, rng):
         (va + w)[:, order],
     )
     same(one, other, "closing_speed")
-    np.testing.assert_array_equal(other.normal, one.normal[:, order])
+    sides = (one.closing_speed == 0.0) & (other.normal == -one.normal[:, order]).all(axis=1)
+    np.testing.assert_array_equal(other.normal[~sides], one.normal[~sides][:, order])
+    assert sides.sum() <= 2
     for i in range(len(a)):
         points = sorted(map(tuple, points_of(one, i)[:, order].tolist()))
         assert points == sorted(map(tuple, points_of(other, i).tolist()))
@@ -569,10 +592,8 @@ def test_law_reflected_coordinates(batch):
     one = solve(a, b, va, va + w)
     other = solve([x * mirror for x in a], [x * mirror for x in b], va * mirror, (va + w) * mirror)
     same(one, other, "closing_speed")
-    # Flat bodies that slide along or rest on each other have two sides to choose from.
-    sides = (one.closing_speed == 0.0) & (other.normal == -one.normal * mirror).all(axis=1)
+    sides = two_sided(one, other, mirror)
     np.testing.assert_array_equal(other.normal[~sides], one.normal[~sides] * mirror)
-    assert sides.sum() < 5
 
 
 @pytest.mark.parametrize(("length", "speed"), [(7, 0), (-3, 5), (-400, -300), (-700, 0), (700, 0), (300, -300)])

@@ -53,7 +53,11 @@ std::optional<Vector> without(const Vector& d, const Vector& g, const Vector& h)
         return {};
     }
     const Vector n = cross(g, h);
-    return dot(n, d).sign() < 0 ? -n : n;
+    const int side = dot(n, d).sign();
+    if (side == 0) {
+        return {};  // d is in their span: nothing is left of it
+    }
+    return side < 0 ? -n : n;
 }
 
 /// The direction nearest to d along which no arm is below 0; nothing if that is 0.
