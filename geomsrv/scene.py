@@ -533,9 +533,9 @@ class Scene:
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
-        Polygons in pure translation are followed; pairs at rest relative to each other touch now or never;
-        any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier "bound" a
-        row means that the pair may touch, TOUCHING that it may already.
+        Polygons, boxes and hulls in pure translation are followed; pairs at rest relative to each other touch now or
+        never; any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier
+        "bound" a row means that the pair may touch, TOUCHING that it may already.
 
         Parameters
         ----------

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomsrv.narrow_phase import followed_solids
 from geomsrv.visibility import boxed_kinds
 from geomsrv.world import World, supported_kinds
 
@@ -44,19 +45,30 @@ def _first_contacts(world: World) -> list[str]:
     if not moving.any():
         return ["first contacts: nothing moves, nothing is swept; pairs are in contact now or never"]
     lines = [f"first contacts: boxes swept for {_count(int(moving.sum()), 'moving object')}"]
-    followed = int((moving & ~world.turns)[polygons].sum())
+    sliding, known = moving & ~world.turns, followed_solids(world)
+    followed = [
+        _count(int(number), name, plural)
+        for number, name, plural in (
+            (sliding[polygons].sum(), "polygon", ""),
+            ((sliding & known)[solids].sum(), "box or hull", "boxes and hulls"),
+        )
+        if number
+    ]
     if followed:
-        lines.append(f"- followed in translation: {_count(followed, 'polygon')}")
+        lines.append(f"- followed in translation: {', '.join(followed)}")
     turning = int(world.turns[polygons].sum())
     if turning:
         lines.append(
             f"- unsupported unless in contact now: {_count(turning, 'polygon')} that turn or move unpredictably"
         )
-    if moving[solids].any():
+    strange = int((moving & ~(known & sliding))[solids].sum())
+    if strange:
         lines.append(
-            f"- unsupported unless in contact now: {_count(int(moving[solids].sum()), 'moving solid')}, "
+            f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "
             "against whatever moves differently"
         )
+    if (sliding & known)[solids].any() and not known[solids].all():
+        lines.append("- unsupported unless in contact now: boxes and hulls that move, against solids of other kinds")
     return lines
 
 

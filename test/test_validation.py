@@ -482,9 +482,9 @@ FAULTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: gs.distance_to_frustum(None, CENTERS),
         "frustum must be Frustum or Frustum2D, got NoneType",
     ),
-    "moving boxes": (
-        lambda: gs.first_contact(boxes(), boxes(), (0, 0, 0), (0, 0, 0)),
-        "a must be Polygons or Polytopes, got Boxes",
+    "moving frustum": (
+        lambda: gs.first_contact(frustum(), boxes(), (0, 0, 0), (0, 0, 0)),
+        "a must be Polygons or Polytopes or Boxes, got Frustum",
     ),
     "plane against space": (
         lambda: gs.first_contact(polygons(), polytopes(), (0, 0), (0, 0)),
@@ -559,6 +559,7 @@ TIERS_ANSWERED = {
     "distance_to_frustum": EVERY,
     "distance_to_frustum.2d": EVERY,
     "first_contact": EVERY,
+    "first_contact.3d": ("bound", "exact"),
     "distance": EVERY,
     "distance.batches": EVERY,
     "intersects": EVERY,
