@@ -52,6 +52,7 @@ CULL_COUNTS = {
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of shapes
+SOLID_MOTION_TIERS = ("bound", "float64", "exact")  #: of first contact in space
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -261,7 +262,7 @@ def first_contact(
     end = float(_validate.floats(t_max, "t_max", (), allow_infinite=True))
     if not end >= 0.0:
         raise GeometryError(f"t_max must be >= 0, got {end}")
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, SHAPE_TIERS if d == 2 else SOLID_MOTION_TIERS)
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polygons) and isinstance(b, Polygons):
