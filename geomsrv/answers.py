@@ -280,9 +280,6 @@ class FirstContacts(_Certified):
         counter-clockwise about the normal, or the vertices of what they share if they overlap at the start.
     certain : (n,) bool
         True where exact arithmetic is proven to give the same ``status``.
-    closing_speed : (n,) float64
-        Speed along the normal at which the bodies approach at ``time`` [m/s], < 0 where they part; NaN where there is
-        no normal.  Of polygons it is that along ``normal`` as it stands, in float64.
     message : str
         Names what is unsupported; empty otherwise.
     cost : Cost
@@ -297,6 +294,15 @@ class FirstContacts(_Certified):
     points: FloatArray
     point_offsets: IntArray
     certain: BoolArray
-    closing_speed: FloatArray
+    _closing_speed: FloatArray | Callable[[], FloatArray] = field(repr=False)
     cost: Cost
     message: str = ""
+
+    @cached_property
+    def closing_speed(self) -> FloatArray:
+        """(n,) float64: speed along the normal at which the bodies approach at ``time`` [m/s].
+
+        < 0 where they part; NaN where there is no normal.  Of polygons it is that along ``normal`` as it stands, in
+        float64, on first use.
+        """
+        return self._closing_speed() if callable(self._closing_speed) else self._closing_speed

@@ -272,16 +272,18 @@ def first_contact(
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
     end = _validate.limit(t_max, "t_max")
-    planar = isinstance(a, Polygons) and isinstance(b, Polygons)
-    tier = _validate.accuracy(accuracy, TIERS if planar else SOLID_MOTION_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS if d == 2 else SOLID_MOTION_TIERS)
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polygons) and isinstance(b, Polygons):
         answer = _core.first_contact_polygons(
             a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # velocities may differ by more than the largest double
-            speed = -((moving_b - moving_a) * answer[5]).sum(axis=1)
+
+        def speed() -> FloatArray:
+            with np.errstate(over="ignore", invalid="ignore"):  # velocities may differ by more than the largest double
+                return -((moving_b - moving_a) * answer[5]).sum(axis=1)
+
         cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
         return FirstContacts(*answer[:-1], speed, cost, _record=proof)
     side_a, side_b = (_side(cast(Boxes | Polytopes, body)) for body in (a, b))

@@ -197,7 +197,7 @@ QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
 
 # -------------------------------------------------------------------------------------------------------- hashing
 
-LAZY = {"_point_a": "point_a", "_normal": "normal"}  #: found on first use
+LAZY = {"_point_a": "point_a", "_normal": "normal", "_closing_speed": "closing_speed"}  #: found on first use
 
 
 def content(answer: Any) -> Iterator[tuple[str, NDArray[Any]]]:

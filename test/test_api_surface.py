@@ -306,6 +306,8 @@ def test_engine_refuses_moving_sides_that_it_would_have_to_copy() -> None:
     for side in ((), boxes * 2):
         with pytest.raises(TypeError, match="first_contact: a side must be"):
             _core.first_contact_world(boxes, side, *rest)
+    with pytest.raises(ValueError, match="first_contact: no such accuracy"):
+        _core.first_contact_world(boxes, boxes, *rest, "float32")
     with pytest.raises(TypeError, match="incompatible function arguments"):
         _core.first_contact_world(boxes, boxes, rest[0].astype(np.float32), *rest[1:])
 

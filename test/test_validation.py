@@ -595,8 +595,10 @@ def test_certificates_need_a_tier_that_leaves_something_to_prove(query: str) -> 
 def numbers_of(value: Any) -> list[Any]:
     """Every number a shape or an answer holds, bit by bit (a nan equals itself); timings aside."""
     fields = getattr(value, "__dataclass_fields__", {})
-    kept = [getattr(value, name, None) for name in fields if name not in ("cost", "_point_a", "_normal")]
-    kept += [getattr(value, name) for name in ("vertices", "point_a", "normal") if hasattr(value, name)]
+    aside = ("cost", "_point_a", "_normal", "_closing_speed")
+    kept = [getattr(value, name, None) for name in fields if name not in aside]
+    found = ("vertices", "point_a", "normal", "closing_speed")
+    kept += [getattr(value, name) for name in found if hasattr(value, name)]
     return [(item.shape, item.tobytes()) if isinstance(item, np.ndarray) else item for item in kept]
 
 

@@ -160,6 +160,9 @@ nb::tuple first_contact(const nb::tuple& side_a, const nb::tuple& side_b, const 
                         const Rows3& velocity_b, double t_max, bool contact_set, std::string_view accuracy) {
     const MovingBodies a(side_a, velocity_a);
     const MovingBodies b(side_b, velocity_b);
+    if (accuracy != "bound" && accuracy != "float64" && accuracy != "exact") {
+        throw nb::value_error("first_contact: no such accuracy");
+    }
     const std::size_t count = a.size() == 1 ? b.size() : a.size();
     const auto fits = [&](std::size_t n) { return n == 1 || n == count; };
     if (!fits(b.size()) || !fits(a.velocities()) || !fits(b.velocities())) {
