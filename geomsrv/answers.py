@@ -55,6 +55,7 @@ class ContactStatus(IntEnum):
     OVERLAPPING = 3  #: in contact at t = 0 with depth > 0; so is a point or a segment inside a body
     UNSUPPORTED = 4  #: no kernel for this pair or motion; every number is NaN
     NOT_CONVERGED = 5  #: the work budget ran out; ``time_lower`` and ``time_upper`` bracket the answer
+    GRAZING = 6  #: apart until ``time``; there, neither contact nor its absence could be proven
 
 
 class DistanceStatus(IntEnum):

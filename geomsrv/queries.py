@@ -35,6 +35,7 @@ from geomsrv.shapes import (
     Sphere,
     pack,
 )
+from geomsrv.turning import first_contact_turning, turns
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -187,8 +188,8 @@ def distance_to_frustum(
 
 
 def first_contact(
-    a: Polygons | Polytopes,
-    b: Polygons | Polytopes,
+    a: Boxes | Polygons | Polytopes,
+    b: Boxes | Polygons | Polytopes,
     velocity_a: ArrayLike,
     velocity_b: ArrayLike,
     *,
@@ -196,8 +197,13 @@ def first_contact(
     accuracy: str = "float64",
     contact_set: bool = True,
     certificates: bool = False,
+    angular_velocity_a: ArrayLike | None = None,
+    angular_velocity_b: ArrayLike | None = None,
+    center_a: ArrayLike | None = None,
+    center_b: ArrayLike | None = None,
+    tolerance: float = 1e-6,
 ) -> FirstContacts:
-    """When and where translating convex bodies first touch.
+    """When and where convex bodies first touch that translate, or translate and turn.
 
     Parameters
     ----------
@@ -242,6 +248,18 @@ def first_contact(
     (array([2.]), array([4.]), array([[1., 0.]]), [[3.0, 0.5], [3.0, 1.0]])
     """
     start = time.perf_counter_ns()
+    if turns(angular_velocity_a, angular_velocity_b):
+        return first_contact_turning(
+            (a, b),
+            (velocity_a, velocity_b),
+            (angular_velocity_a, angular_velocity_b),
+            (center_a, center_b),
+            t_max=t_max,
+            tolerance=tolerance,
+            accuracy=accuracy,
+            contact_set=contact_set,
+            certificates=certificates,
+        )
     _expect(a, (Polygons, Polytopes), "a")
     _expect(b, type(a), "b")
     count = _common_length(len(a), len(b))

@@ -12,6 +12,7 @@ void define_frustum(nanobind::module_& m);
 void define_point_frustum(nanobind::module_& m);
 void define_polygons(nanobind::module_& m);
 void define_distance(nanobind::module_& m);
+void define_turning(nanobind::module_& m);
 void define_broad_phase(nanobind::module_& m);
 
 }  // namespace geomsrv::bind

@@ -1,0 +1,631 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// Conservative advancement (Mirtich 1996, Zhang et al. 2006) along a direction that turns with the bodies.
+//
+// At time t the nearest points give a direction n along which the bodies are apart.  It is let turn like the
+// feature it stands on, n(s) = R(spin s) n: a face's normal stays one, and that of two crossing edges too.
+// The height of a vertex along n(s), at time t + s, is bounded by its value, its rate and its curvature:
+//
+//     | n(s) . x(t + s) - (h + s h') | <= s^2 M / 2
+//
+//     gap(s) >= L(s) = min over b (h + s h') - max over a (h + s h') - s^2 (M_a + M_b) / 2
+//
+// L is concave, so where it is positive at 0 and at s it is positive between: the bodies are apart until
+// t + s.  No contact is stepped over, however fast or thin the bodies are.  Near contact only s^2 M / 2 is
+// lost, so the steps converge quadratically; a direction that stood still would lose the rate at which a face
+// turns.
+//
+// Contact is proven by a simplex of the difference b - a that holds the origin inside by more than rounding,
+// or by the intermediate value theorem: a facet of the difference has the origin on one side now and on the
+// other later, and the foot of the origin inside all the time in between.
+//
+// Doubles decide, with bounds for all they round; where gap or step drown in those, double-double does.
+#include "geom/turning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "geom/rounding.hpp"
+
+namespace geomsrv {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Looks at one pair; each takes a microsecond or less.
+constexpr int kMostLooks = 1 << 16;
+
+// Balls about the centres further apart than this times the sum of their radii: no need to look at the
+// bodies.
+constexpr double kFar = 2.0;
+
+// Heights of vertices along a unit direction and their least and largest, in doubles: products and sums of
+// three terms, no longer than the size of the pair, 8 u for each body.
+constexpr double kHeightError = 16 * kUnitRoundoff;
+
+// Rates likewise, of vectors that take up to 10 roundings themselves.
+constexpr double kRateError = 32 * kUnitRoundoff;
+
+// What heights in double-double round besides their vertices: a dot product and a difference for each body.
+constexpr double kWideHeightError = 0x1p-96;
+
+// Bounds on curvature are sums and products of positive numbers, less than 2^10 operations.
+constexpr double kCurvatureSlack = 1.0 + 0x1p-40;
+
+// A step in doubles is left to double-double where rounding takes more than this of the gap.
+constexpr double kGapShare = 0x1p-5;
+
+// How much a root of a piece of L is shortened, so that L is positive there in spite of rounding.
+constexpr double kShortened[] = {0x1p-20, 0x1p-12, 0x1p-8, 0x1p-4, 0x1p-2, 0x1p-1};
+
+// Contact is looked for where a step takes no more than this part of the tolerance, and first at so many
+// steps ahead: after contact, by more than the step's own error.
+constexpr double kStepsAhead = 4.0;
+constexpr double kFurtherAhead = 8.0;
+constexpr int kCrossings = 3;  // tries at proving contact by the intermediate value theorem
+
+// 2 pi, rounded up; a period takes four more roundings.
+constexpr double kTwoPi = 0x1.921fb54442d19p+2;
+constexpr double kPeriodSlack = 1.0 + 8 * kUnitRoundoff;
+
+Vec3 unit_or(Vec3 v, Vec3 other) { return norm(v) > 0.0 ? normalized(v) : other; }
+
+/// t + step, rounded down.
+double later(double t, double step) {
+    const DoubleDouble sum = two_sum(t, step);
+    return sum.lo < 0.0 ? next_down(sum.hi) : sum.hi;
+}
+
+WideVec3 times(WideVec3 v, double t) { return {v.x * t, v.y * t, v.z * t}; }
+
+double triple(Vec3 x, Vec3 y, Vec3 z) { return dot(x, cross(y, z)); }
+
+}  // namespace
+
+struct TurningSolver::Look {
+    double t = 0.0;
+    WideVec3 wide_between;       ///< from the centre of a to that of b
+    double between_error = 0.0;  ///< of it
+    Vec3 between;
+    double size = 0.0;   ///< no vertex is further from the centre of a, both bodies added
+    double error = 0.0;  ///< of all vertices as stored, both bodies added
+    Core a, b;
+    Gjk found;
+};
+
+struct TurningSolver::Direction {
+    Vec3 normal;  ///< unit
+    Vec3 spin;    ///< angular velocity of the normal
+    Vec3 change;  ///< of the normal: spin x normal
+};
+
+void TurningSolver::prepare(const TurningBody& a, const TurningBody& b) {
+    a_.body.read(a);
+    b_.body.read(b);
+    planar_ = a.dimension == 2;
+    center_a_ = a.center;
+    velocity_a_ = a.velocity;
+    between_ = exact_difference(b.center, a.center);
+    speed_ = exact_difference(b.velocity, a.velocity);
+
+    // The size of the bodies becomes about 1; points take that of their distance.
+    double size = a_.body.reach() + b_.body.reach();
+    if (!(size > 0.0)) {
+        const Vec3 d = narrow(between_);
+        size = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
+    }
+    exponent_ = size > 0.0 ? -exponent_of(size) : 0;
+    const PowerOfTwo by(exponent_);
+    a_.body.scale(by);
+    b_.body.scale(by);
+    for (WideVec3* v : {&between_, &speed_}) {
+        for (DoubleDouble* x : {&v->x, &v->y, &v->z}) {
+            *x = {by * x->hi, by * x->lo};
+        }
+    }
+    velocity_ = narrow(speed_);
+    for (Side* side : {&a_, &b_}) {
+        side->height.resize(side->body.size());
+        side->rate.resize(side->body.size());
+    }
+}
+
+/// From when on everything repeats itself; infinite if that is not known.
+double TurningSolver::end_of_period() const {
+    const Vec3 w = a_.body.angular();
+    const Vec3 v = b_.body.angular();
+    const auto is_zero = [](Vec3 x) { return x.x == 0.0 && x.y == 0.0 && x.z == 0.0; };
+    if (!is_zero(velocity_)) {
+        return kInfinity;
+    }
+    double rate = 0.0;
+    if (is_zero(w) || is_zero(v)) {
+        rate = a_.body.speed() + b_.body.speed();
+    } else if (w.x == v.x && w.y == v.y && w.z == v.z) {
+        rate = a_.body.speed();
+    } else if (is_zero(narrow(between_)) && w.x == 0.0 && w.y == 0.0 && v.x == 0.0 && v.y == 0.0) {
+        rate = std::fabs(v.z - w.z);  // about one axis
+    }
+    return kTwoPi / rate * kPeriodSlack;
+}
+
+void TurningSolver::place(Look& at) const {
+    at.wide_between = between_ + times(speed_, at.t);
+    at.between = narrow(at.wide_between);
+    at.between_error = 8 * kWideRoundoff * (norm(narrow(between_)) + norm(velocity_) * at.t);
+}
+
+TurningSolver::Look TurningSolver::look(double t, Vec3 start) {
+    Look at;
+    at.t = t;
+    place(at);
+    a_.body.place(t);
+    b_.body.place(t);
+    at.a = a_.body.core();
+    at.b = b_.body.core();
+    at.b.center = at.between;
+    const double away = norm(at.between);
+    at.b.reach += away;
+    at.size = at.a.reach + at.b.reach;
+    at.error = at.a.error + at.b.error + kUnitRoundoff * away + at.between_error;
+    at.found = gjk(at.a, at.b, start);
+    return at;
+}
+
+/// How long the bodies certainly stay apart along a direction that stands still.  For each of them the faster
+/// of two bounds counts: its vertices move no faster than w r, and never leave the ball about its centre.
+double TurningSolver::coarse_step(const Look& at, Vec3 normal) const {
+    const double error = at.error + kHeightError * at.size;
+    const double closing = kRateError * norm(velocity_) - dot(normal, velocity_);
+    const double middle = dot(normal, at.between);
+    const auto sweep = [&](const TurningVertices& body) {
+        return (norm(cross(normal, body.angular())) + kRateError * body.speed()) * body.reach();
+    };
+    const double tops[] = {highest(at.a, normal).value, at.a.reach};
+    const double bottoms[] = {lowest(at.b, normal).value, middle - b_.body.reach() * (1.0 + kPlaceError)};
+    const double rates_a[] = {sweep(a_.body), 0.0};
+    const double rates_b[] = {sweep(b_.body), 0.0};
+    double step = 0.0;
+    for (const int i : {0, 1}) {
+        for (const int j : {0, 1}) {
+            const double gap = bottoms[j] - tops[i] - error;
+            const double rate = closing + rates_a[i] + rates_b[j];
+            if (gap > 0.0) {
+                step = std::max(step, rate > 0.0 ? gap / rate * (1.0 - kHeightError) : kInfinity);
+            }
+        }
+    }
+    return step;
+}
+
+/// A direction that turns so that all vertices of a feature of the difference keep the same height.
+TurningSolver::Direction TurningSolver::direction_of(const Witness& feature, Vec3 normal) const {
+    Direction out{normal, {}, {}};
+    if (feature.count < 2 || feature.count > 3) {
+        return out;
+    }
+    Vec3 edge[2];
+    double wanted[2];  // change . edge
+    const Vec3 a0 = a_.body.placed(static_cast<std::size_t>(feature.a[0]));
+    const Vec3 b0 = b_.body.placed(static_cast<std::size_t>(feature.b[0]));
+    for (int i = 1; i < feature.count; ++i) {
+        const Vec3 p = a_.body.placed(static_cast<std::size_t>(feature.a[i])) - a0;
+        const Vec3 q = b_.body.placed(static_cast<std::size_t>(feature.b[i])) - b0;
+        edge[i - 1] = q - p;
+        wanted[i - 1] = -dot(normal, cross(b_.body.angular(), q) - cross(a_.body.angular(), p));
+    }
+    Vec3 change;
+    const double ee = dot(edge[0], edge[0]);
+    if (feature.count == 2) {
+        change = (wanted[0] / ee) * edge[0];
+    } else {
+        const double ff = dot(edge[1], edge[1]);
+        const double ef = dot(edge[0], edge[1]);
+        const double determinant = ee * ff - ef * ef;
+        change = ((wanted[0] * ff - wanted[1] * ef) / determinant) * edge[0] +
+                 ((wanted[1] * ee - wanted[0] * ef) / determinant) * edge[1];
+    }
+    const Vec3 spin = cross(normal, change);
+    if (norm(spin) < kInfinity) {  // false for NaN, too: repeated vertices span nothing
+        out.spin = spin;
+        out.change = cross(spin, normal);
+    }
+    return out;
+}
+
+/// The longest step found at the end of which L is positive, at most `longest`; heights are known to
+/// `gap_error`.
+double TurningSolver::fine_step(const Look& at, const Direction& direction, double gap_error,
+                                double longest) const {
+    const double spin = norm(direction.spin);
+    const double turning_a = a_.body.speed();
+    const double turning_b = b_.body.speed();
+    const double turning = spin + turning_a + turning_b;
+    const double rate_error =
+        turning * (at.error + kRateError * at.size) + kRateError * norm(velocity_);
+
+    struct Piece {
+        double value, gap, rate;
+    };
+    // L, and of the vertices that make it the gap and the rate at which it closes.
+    const auto linear = [&](double s) -> Piece {
+        std::size_t low = 0;
+        std::size_t top = 0;
+        double least = kInfinity;
+        double most = -kInfinity;
+        for (std::size_t j = 0; j < b_.height.size(); ++j) {
+            const double value = b_.height[j] + s * b_.rate[j];
+            if (value < least) {
+                least = value;
+                low = j;
+            }
+        }
+        for (std::size_t i = 0; i < a_.height.size(); ++i) {
+            const double value = a_.height[i] + s * a_.rate[i];
+            if (value > most) {
+                most = value;
+                top = i;
+            }
+        }
+        return {least - most - (gap_error + s * rate_error), b_.height[low] - a_.height[top] - gap_error,
+                a_.rate[top] - b_.rate[low] + rate_error};
+    };
+    if (!(linear(0.0).value > 0.0)) {
+        return 0.0;
+    }
+    double s = longest;
+    if (turning > 0.0) {
+        s = std::min(s, 1.0 / turning);  // beyond, the curvature of a circle has little to do with its arc
+    }
+    if (!(s < kInfinity)) {
+        // Nothing turns: any pair of vertices that come nearer bounds the step.
+        double fastest = 0.0;
+        double gap = 0.0;
+        for (std::size_t i = 0; i < a_.height.size(); ++i) {
+            for (std::size_t j = 0; j < b_.height.size(); ++j) {
+                const double rate = a_.rate[i] - b_.rate[j] + rate_error;
+                if (rate > fastest) {
+                    fastest = rate;
+                    gap = b_.height[j] - a_.height[i];
+                }
+            }
+        }
+        if (!(fastest > 0.0)) {
+            return kInfinity;
+        }
+        s = gap / fastest;
+    }
+
+    // M for steps up to s.  Vertices are seen from a point between the bodies, at y, that moves along with
+    // both:
+    //   h'' = n''.y + 2 n'.y' + n.y'',  |n'| = spin, |n''| <= spin^2, y'' = w x (w x r),
+    //   n(s).y'' = r.(w x (w x n(s))).
+    const Vec3 origin = 0.5 * (at.found.point_a + at.found.point_b);
+    const Vec3 drift_a = cross(a_.body.angular(), origin);
+    const Vec3 drift_b = velocity_ + cross(b_.body.angular(), origin - at.between);
+    const double drift = 0.5 * norm(drift_b - drift_a);
+    const auto curvature = [&](const TurningVertices& body, Vec3 center) {
+        double furthest = 0.0;
+        const Vec3 seen = center - origin;
+        for (std::size_t i = 0; i < body.size(); ++i) {
+            const Vec3 y = seen + body.placed(i);
+            furthest = std::max(furthest, dot(y, y));
+        }
+        const double w = body.speed();
+        const double centripetal = w * w * body.reach();
+        const double speed = w * (std::sqrt(furthest) + at.error) + drift + rate_error;
+        const double y = std::sqrt(furthest) + at.error + s * speed + 0.5 * s * s * centripetal;
+        const double tilt = norm(cross(body.angular(), direction.normal)) + kRateError * w + w * spin * s;
+        return spin * spin * y + 2.0 * spin * (speed + s * centripetal) + w * tilt * body.reach();
+    };
+    const double half_curvature =
+        0.5 * kCurvatureSlack * (curvature(a_.body, {}) + curvature(b_.body, at.between));
+
+    for (const double part : kShortened) {
+        const Piece piece = linear(s);
+        if (piece.value - half_curvature * s * s > 0.0) {
+            return s;
+        }
+        const double root = std::sqrt(piece.rate * piece.rate + 4.0 * half_curvature * piece.gap);
+        const double next = piece.rate > 0.0 ? 2.0 * piece.gap / (piece.rate + root)
+                                             : (root - piece.rate) / (2.0 * half_curvature);
+        s = (next < s ? next : s) * (1.0 - part);
+    }
+    return linear(s).value - half_curvature * s * s > 0.0 ? s : 0.0;
+}
+
+/// Heights and rates of all vertices, in doubles.
+void TurningSolver::measure(const Look& at, const Direction& direction) {
+    const Vec3 n = direction.normal;
+    const auto fill = [&](Side& side, double height, double rate) {
+        const Vec3 turned = direction.change + cross(n, side.body.angular());
+        const std::size_t count = side.body.size();
+        const double* x = side.body.coordinates();
+        const double* y = x + count;
+        const double* z = y + count;
+        for (std::size_t i = 0; i < count; ++i) {
+            side.height[i] = height + (n.x * x[i] + n.y * y[i] + n.z * z[i]);
+            side.rate[i] = rate + (turned.x * x[i] + turned.y * y[i] + turned.z * z[i]);
+        }
+    };
+    fill(a_, 0.0, 0.0);
+    fill(b_, dot(n, at.between), dot(direction.change, at.between) + dot(n, velocity_));
+}
+
+/// A fine step from heights in double-double, along the normal of a feature.
+double TurningSolver::wide_step(const Look& at, const Witness& feature, double longest) {
+    if (feature.count < 1 || feature.count > 3) {
+        return 0.0;
+    }
+    a_.body.turn_wide(at.t);
+    b_.body.turn_wide(at.t);
+    const auto a = [&](int i) { return a_.body.placed_wide(static_cast<std::size_t>(feature.a[i])); };
+    const auto b = [&](int i) { return b_.body.placed_wide(static_cast<std::size_t>(feature.b[i])); };
+    const auto edge = [&](int i) { return (b(i) - b(0)) - (a(i) - a(0)); };
+    WideVec3 n = widen(at.found.normal);
+    if (feature.count == 2) {
+        const WideVec3 e = edge(1);
+        n = n - (dot(n, e) / dot(e, e)) * e;
+    } else if (feature.count == 3) {
+        n = cross(edge(1), edge(2));
+        if (dot(narrow(n), at.found.normal) < 0.0) {
+            n = -n;
+        }
+    }
+    const double length = norm(narrow(n));
+    if (!(length > 0.0)) {
+        return 0.0;
+    }
+    n = times(n, 1.0 / length);
+
+    const Direction direction = direction_of(feature, narrow(n));
+    measure(at, direction);
+    const DoubleDouble level = dot(n, a(0));
+    for (std::size_t i = 0; i < a_.height.size(); ++i) {
+        a_.height[i] = (dot(n, a_.body.placed_wide(i)) - level).hi;
+    }
+    const DoubleDouble center = dot(n, at.wide_between) - level;
+    for (std::size_t j = 0; j < b_.height.size(); ++j) {
+        b_.height[j] = (dot(n, b_.body.placed_wide(j)) + center).hi;
+    }
+    const double error = a_.body.wide_error(at.t) + b_.body.wide_error(at.t) + at.between_error +
+                         kWideHeightError * at.size;
+    return fine_step(at, direction, error, longest);
+}
+
+/// Whether a simplex of the difference certainly holds the origin inside.
+bool TurningSolver::overlap(const Look& at) const {
+    const Witness& w = at.found.witness;
+    if (w.count != (planar_ ? 3 : 4)) {
+        return false;
+    }
+    Vec3 k[4];
+    double length[4];
+    for (int i = 0; i < w.count; ++i) {
+        k[i] = at.between + b_.body.placed(static_cast<std::size_t>(w.b[i])) -
+               a_.body.placed(static_cast<std::size_t>(w.a[i]));
+        length[i] = norm(k[i]);
+    }
+    const double error = 2.0 * (at.error + kHeightError * at.size);
+    // The origin is a sum of the vertices with these determinants as weights.
+    int positive = 0;
+    int negative = 0;
+    const auto count = [&](double value, double doubt) {
+        positive += value > doubt ? 1 : 0;
+        negative += value < -doubt ? 1 : 0;
+    };
+    if (planar_) {
+        for (int i = 0; i < 3; ++i) {
+            const int j = (i + 1) % 3;
+            count(k[i].x * k[j].y - k[i].y * k[j].x,
+                  error * (length[i] + length[j]) + kHeightError * length[i] * length[j]);
+        }
+    } else {
+        constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+        for (const auto& o : kOthers) {
+            const double x = length[o[0]];
+            const double y = length[o[1]];
+            const double z = length[o[2]];
+            count(triple(k[o[0]], k[o[1]], k[o[2]]), error * (x * y + y * z + z * x) + kRateError * x * y * z);
+        }
+    }
+    return positive == w.count || negative == w.count;
+}
+
+/// Whether the origin certainly passes through a facet of the difference between the time of the look and t.
+bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
+    const int count = planar_ ? 2 : 3;
+    if (feature.count != count) {
+        return false;
+    }
+    WideVec3 k[2][3];  // now and later
+    double error = kWideHeightError * at.size;
+    const double times_of[] = {at.t, t};
+    for (const int when : {0, 1}) {
+        Look then;
+        then.t = times_of[when];
+        place(then);
+        a_.body.turn_wide(then.t);
+        b_.body.turn_wide(then.t);
+        for (int i = 0; i < count; ++i) {
+            k[when][i] = then.wide_between + b_.body.placed_wide(static_cast<std::size_t>(feature.b[i])) -
+                         a_.body.placed_wide(static_cast<std::size_t>(feature.a[i]));
+        }
+        error = std::max(error, a_.body.wide_error(then.t) + b_.body.wide_error(then.t) + then.between_error +
+                                    kWideHeightError * at.size);
+    }
+    const double speed = norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
+    const double way = (speed * (t - at.t)) * (1.0 + kRateError) + error;  // of any vertex meanwhile
+    Vec3 now[3];
+    double furthest = 0.0;
+    for (int i = 0; i < count; ++i) {
+        now[i] = narrow(k[0][i]);
+        furthest = std::max(furthest, norm(now[i]));
+    }
+    furthest += way;
+
+    // Weights of the foot of the origin, times |normal|^2, and how much they may change: products of `count`
+    // factors more than the facet has, each no longer than twice the furthest.
+    if (planar_) {
+        const Vec3 e = now[1] - now[0];
+        const double doubt = 4.0 * furthest * way + kRateError * furthest * furthest;
+        if (!(dot(e, now[1]) > doubt && -dot(e, now[0]) > doubt)) {
+            return false;
+        }
+    } else {
+        const Vec3 normal = cross(now[1] - now[0], now[2] - now[0]);
+        const double cube = furthest * furthest * furthest;
+        const double doubt = 16.0 * cube * way + 8.0 * kRateError * cube * furthest;
+        for (int i = 0; i < 3; ++i) {
+            if (!(dot(normal, cross(now[(i + 1) % 3], now[(i + 2) % 3])) > doubt)) {
+                return false;
+            }
+        }
+    }
+    const auto side = [&](const WideVec3* v) {
+        const double value = planar_ ? (v[0].x * v[1].y - v[0].y * v[1].x).hi : dot(v[0], cross(v[1], v[2])).hi;
+        const double doubt = planar_ ? 4.0 * furthest * error + kWideHeightError * furthest * furthest
+                                     : 6.0 * furthest * furthest * error +
+                                           kWideHeightError * furthest * furthest * furthest;
+        return value > doubt ? 1 : value < -doubt ? -1 : 0;
+    };
+    return side(k[0]) * side(k[1]) < 0;
+}
+
+/// A time at or before which contact is proven, not later than a tolerance after the step; or infinity.
+double TurningSolver::proven_contact(const Look& at, const Witness& feature, double step, double t_max,
+                                     double tolerance) {
+    const double lower = later(at.t, step);
+    const double last = std::min(std::max(later(lower, tolerance), next_up(lower)), t_max);
+    const Vec3 start = at.found.normal;
+    double ahead = std::max(kStepsAhead * step, 2.0 * (next_up(at.t) - at.t));
+    for (int i = 0;; ++i, ahead *= kFurtherAhead) {
+        const double t = std::min(at.t + ahead, last);
+        if (t > lower) {
+            const Look then = look(t, start);
+            if (overlap(then) || ((i < kCrossings || t == last) && crossing(at, feature, t))) {
+                return t;
+            }
+        }
+        if (!(t < last)) {
+            return kInfinity;
+        }
+    }
+}
+
+Vec3 TurningSolver::in_world(Vec3 point, double t) const {
+    const PowerOfTwo down(-exponent_);
+    return center_a_ + (t * velocity_a_ + down * point);
+}
+
+TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, double t_max,
+                                    double tolerance) {
+    prepare(a, b);
+    const double end = std::min(t_max, end_of_period());
+    const double near = kFar * (a_.body.reach() + b_.body.reach());
+    TurningContact out;
+    out.normal = out.point = nan_vector();
+    out.upper = kInfinity;
+    const auto never = [&] {
+        out.status = TurningStatus::never;
+        out.lower = out.upper = std::numeric_limits<double>::quiet_NaN();
+        out.normal = out.point = nan_vector();
+        return out;
+    };
+
+    double t = 0.0;
+    Vec3 start = unit_or(narrow(between_), {1.0, 0.0, 0.0});
+    Witness feature;
+    while (out.looks < kMostLooks && a_.body.placeable(t) && b_.body.placeable(t)) {
+        ++out.looks;
+        out.lower = t;
+        Look at;
+        at.t = t;
+        place(at);
+        const double away = norm(at.between);
+        if (!(away < kLargestReach)) {
+            break;
+        }
+        if (away > near) {
+            // As balls.
+            const Vec3 n = normalized(at.between);
+            const double rate = kRateError * norm(velocity_) - dot(n, velocity_);
+            const double gap = away * (1.0 - kHeightError) - at.between_error - 0.5 * near * (1.0 + kPlaceError);
+            const double step = rate > 0.0 ? gap / rate * (1.0 - kHeightError) : kInfinity;
+            const double next = later(t, step);
+            if (next >= end) {
+                return never();
+            }
+            if (!(next > t)) {
+                break;
+            }
+            t = next;
+            start = n;
+            continue;
+        }
+
+        at = look(t, start);
+        if (t == 0.0 && overlap(at)) {
+            out.status = TurningStatus::overlapping;
+            out.lower = out.upper = 0.0;
+            out.point = in_world(0.5 * (at.found.point_a + at.found.point_b), 0.0);
+            return out;
+        }
+        const double remaining = end - t;
+        const double doubt = at.error + kHeightError * at.size;
+        const Vec3 normal = at.found.normal;
+        double step = coarse_step(at, normal);
+        Direction direction{normal, {}, {}};
+        if (at.found.witness.count <= 3) {
+            direction = direction_of(at.found.witness, normal);
+            measure(at, direction);
+            step = std::max(step, fine_step(at, direction, doubt, remaining));
+        }
+        if (!(doubt < kGapShare * at.found.gap) || !(later(t, step) > t)) {
+            const double filter = step;
+            step = std::max(step, wide_step(at, at.found.witness, remaining));
+            if (!(step > 0.0)) {
+                step = wide_step(at, feature, remaining);
+            }
+            if (step > filter) {
+                out.rung = Rung::wide;
+            }
+        }
+        if (step >= remaining && step > 0.0) {
+            return never();
+        }
+        const double next = later(t, step);
+        if (step > 0.0) {
+            feature = at.found.witness;
+        }
+        if (kStepsAhead * step <= tolerance || !(next > t)) {
+            const double upper = proven_contact(at, feature, step, t_max, tolerance);
+            if (upper < kInfinity || !(next > t)) {
+                out.status = upper < kInfinity      ? TurningStatus::will_touch
+                             : t == 0.0 && step == 0.0 ? TurningStatus::touching
+                                                       : TurningStatus::grazing;
+                out.lower = next;
+                out.upper = upper;
+                const Look then = look(next, normal);
+                const Witness& w = at.found.witness;
+                Vec3 middle;
+                for (int i = 0; i < w.count; ++i) {
+                    const Vec3 p = a_.body.placed(static_cast<std::size_t>(w.a[i]));
+                    const Vec3 q = b_.body.placed(static_cast<std::size_t>(w.b[i])) + then.between;
+                    middle = middle + (0.5 * w.weight[i]) * (p + q);
+                }
+                out.point = in_world(middle, next);
+                out.normal = unit_or(normal + step * direction.change, normal);
+                return out;
+            }
+        }
+        t = next;
+        start = unit_or(normal + step * direction.change, normal);
+    }
+    return out;
+}
+
+}  // namespace geomsrv
