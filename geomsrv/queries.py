@@ -207,10 +207,10 @@ def first_contact(
 
     Parameters
     ----------
-    a, b : Polygons (2D) or Polytopes (3D)
+    a, b : Polygons (2D) or Polytopes (3D); Boxes, too, if anything turns
         n against n, or one against n.
     velocity_a, velocity_b : (n, d) or (d,) float
-        Constant linear velocities [m/s], world frame.
+        Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
@@ -221,12 +221,27 @@ def first_contact(
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
-        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".  Not for bodies
+        that turn.
+    angular_velocity_a, angular_velocity_b : (n, 3) or (3,) float; in 2D (n,) or one number; optional
+        Constant angular velocities [rad/s], world frame.  If any is not zero, a point that is at x0 at the start moves
+        as ``x(t) = c + v t + R(w t) (x0 - c)``, and the only tier is "float64", whose bounds are proven.
+    center_a, center_b : (n, d) or (d,) float, optional
+        The points c at the start [m], which the bodies turn about.  By default the centre of a box, and otherwise the
+        middle of the bounding box, ``0.5 * min + 0.5 * max`` of the vertices in float64.
+    tolerance : float
+        Widest time interval of WILL_TOUCH for bodies that turn [s], > 0; neighbouring doubles always do.
 
     Returns
     -------
     FirstContacts
-        Polytopes answer UNSUPPORTED in this version.
+        Polytopes answer UNSUPPORTED in this version unless something turns.  Then ``time`` is ``time_lower``: the
+        bodies are proven apart before it, and proven in contact at some time until ``time_upper``.  ``normal``, and one
+        contact point midway between the nearest points, are those at ``time``; ``last_time`` is NaN.  TOUCHING, at the
+        start, and GRAZING are outcomes where neither can be proven, with ``time_upper`` inf; NOT_CONVERGED is one
+        where the work allowed did not get beyond ``time_lower``, as for two bodies that turn beside each other for
+        ever.  ``cost.counts``: pairs decided in double ("filter") and double-double ("wide") arithmetic, and how often
+        a pair was looked at.
 
     Raises
     ------
@@ -236,7 +251,7 @@ def first_contact(
     References
     ----------
     Book section 7.7 for the times; the contact set is derived from support features, because the printed labels fail
-    on rotated shapes.
+    on rotated shapes.  Bodies that turn: conservative advancement (Mirtich, 1996), along a direction that turns, too.
 
     Examples
     --------
@@ -246,6 +261,11 @@ def first_contact(
     >>> hit = gs.first_contact(square, other, (1.0, 0.0), (0.0, 0.0))
     >>> hit.time, hit.last_time, hit.normal, hit.points.tolist()
     (array([2.]), array([4.]), array([[1., 0.]]), [[3.0, 0.5], [3.0, 1.0]])
+    >>> rod = gs.Polygons.from_list([[(-1, 0), (1, 0)]])
+    >>> wall = gs.Polygons.from_list([[(-2, 0.5), (2, 0.5)]])
+    >>> swing = gs.first_contact(rod, wall, (0, 0), (0, 0), angular_velocity_a=1.0)
+    >>> float(swing.time[0].round(6)), swing.points.round(6).tolist()
+    (0.523599, [[0.866025, 0.5]])
     """
     start = time.perf_counter_ns()
     if turns(angular_velocity_a, angular_velocity_b):
@@ -262,6 +282,7 @@ def first_contact(
         )
     _expect(a, (Polygons, Polytopes), "a")
     _expect(b, type(a), "b")
+    assert not isinstance(a, Boxes) and not isinstance(b, Boxes)
     count = _common_length(len(a), len(b))
     d = a.dimension
     moving_a, moving_b = (

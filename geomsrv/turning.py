@@ -103,9 +103,7 @@ def first_contact_turning(
 
 def _packed(body: Bodies) -> tuple[Any, ...]:
     """As the engine reads it."""
-    return (
-        (body.center, body.axes, body.half_extents) if isinstance(body, Boxes) else (body.vertices, body.offsets)
-    )
+    return (body.center, body.axes, body.half_extents) if isinstance(body, Boxes) else (body.vertices, body.offsets)
 
 
 def _middles(body: Bodies) -> FloatArray:

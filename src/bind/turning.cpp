@@ -3,7 +3,8 @@
 // First contact of bodies that translate and turn, pair by pair.
 #include "geom/turning.hpp"
 
-#include <stdexcept>
+#include <type_traits>
+#include <utility>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
@@ -12,24 +13,37 @@ namespace geomsrv::bind {
 
 namespace {
 
+using Motions = Input<double, nb::shape<-1, 9>>;
+
 /// Bodies as the Python layer hands them over: (vertices, offsets), or (centers, axes, half extents), and
 /// their motions as rows velocity, angular velocity, centre; one row counts for all.
 class TurningSide {
 public:
-    TurningSide(const nb::tuple& bodies, const Numbers& motion)
+    TurningSide(const nb::tuple& bodies, const Motions& motion)
         : motion_(motion.data()), motions_(motion.shape(0)) {
-        if (motion.ndim() != 2 || motion.shape(1) != 9) {
-            throw std::invalid_argument("a motion is a row of nine numbers");
-        }
-        rows_ = nb::cast<Numbers>(bodies[0]);
-        dimension_ = static_cast<int>(rows_.shape(1));
-        if (bodies.size() == 3) {
-            axes_ = nb::cast<Numbers>(bodies[1]);
-            half_ = nb::cast<Numbers>(bodies[2]);
-            bodies_ = rows_.shape(0);
-        } else {
-            offsets_ = nb::cast<Offsets>(bodies[1]);
-            bodies_ = offsets_.shape(0) - 1;
+        const auto as = [&]<class Array>(std::size_t i, std::type_identity<Array> /*kind*/) {
+            return nb::cast<Array>(bodies[i], false);
+        };
+        try {
+            if (bodies.size() == 3) {
+                const auto centers = as(0, std::type_identity<Rows3>{});
+                const auto axes = as(1, std::type_identity<Matrices3>{});
+                const auto half = as(2, std::type_identity<Rows3>{});
+                rows_ = centers.data();
+                axes_ = axes.data();
+                half_ = half.data();
+                bodies_ = centers.shape(0);
+                return;
+            }
+            const auto vertices = as(0, std::type_identity<Input<double, nb::shape<-1, -1>>>{});
+            const auto offsets = as(1, std::type_identity<Offsets>{});
+            rows_ = vertices.data();
+            dimension_ = static_cast<int>(vertices.shape(1));
+            offsets_ = offsets.data();
+            bodies_ = offsets.shape(0) - 1;
+        } catch (const std::bad_cast&) {
+            throw nb::type_error(
+                "turning: bodies must be (center, axes, half_extents) or (vertices, offsets)");
         }
     }
 
@@ -39,15 +53,15 @@ public:
         TurningBody out;
         out.dimension = dimension_;
         const std::size_t k = bodies_ == 1 ? 0 : i;
-        if (half_.is_valid()) {
-            out.rows = rows_.data() + 3 * k;
+        if (half_ != nullptr) {
+            out.rows = rows_ + 3 * k;
             out.count = 8;
-            out.axes = axes_.data() + 9 * k;
-            out.half = half_.data() + 3 * k;
+            out.axes = axes_ + 9 * k;
+            out.half = half_ + 3 * k;
         } else {
-            const auto first = static_cast<std::size_t>(offsets_.data()[k]);
-            out.rows = rows_.data() + static_cast<std::size_t>(dimension_) * first;
-            out.count = static_cast<std::size_t>(offsets_.data()[k + 1]) - first;
+            const auto first = static_cast<std::size_t>(offsets_[k]);
+            out.rows = rows_ + static_cast<std::size_t>(dimension_) * first;
+            out.count = static_cast<std::size_t>(offsets_[k + 1]) - first;
         }
         const double* m = motion_ + 9 * (motions_ == 1 ? 0 : i);
         out.velocity = {m[0], m[1], m[2]};
@@ -57,16 +71,19 @@ public:
     }
 
 private:
-    Numbers rows_, axes_, half_;
-    Offsets offsets_;
+    // The caller's tuple keeps the arrays alive.
+    const double* rows_ = nullptr;
+    const double* axes_ = nullptr;
+    const double* half_ = nullptr;
+    const std::int64_t* offsets_ = nullptr;
     const double* motion_;
     std::size_t motions_;
     std::size_t bodies_ = 0;
     int dimension_ = 3;
 };
 
-nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Numbers& motion_a,
-                                const Numbers& motion_b, double t_max, double tolerance) {
+nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
+                                const Motions& motion_b, double t_max, double tolerance) {
     const TurningSide a(bodies_a, motion_a);
     const TurningSide b(bodies_b, motion_b);
     const std::size_t count = a.size() == 1 ? b.size() : a.size();

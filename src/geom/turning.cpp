@@ -26,6 +26,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 
 #include "geom/rounding.hpp"
 
@@ -71,7 +72,24 @@ constexpr int kCrossings = 3;  // tries at proving contact by the intermediate v
 constexpr double kTwoPi = 0x1.921fb54442d19p+2;
 constexpr double kPeriodSlack = 1.0 + 8 * kUnitRoundoff;
 
+// Where the origin lies on an edge or a face of a simplex of the difference, as it does between bodies that
+// stand on one floor, no simplex holds it by a margin.  If the corners of a small simplex about it are
+// inside, so is the origin.  Its size is a share of that of the pair: beyond rounding, but less than the
+// bodies overlap.
+constexpr double kCornerShares[] = {0x1p-36, 0x1p-26, 0x1p-16};
+constexpr Vec3 kCorners[] = {{1.0, 0.3, 0.2}, {-0.7, 0.8, 0.3}, {-0.4, -0.9, 0.4}, {0.1, -0.2, -1.0}};
+constexpr Vec3 kFlatCorners[] = {{1.0, 0.3, 0.0}, {-0.7, 0.8, 0.0}, {-0.4, -0.9, 0.0}};
+
 Vec3 unit_or(Vec3 v, Vec3 other) { return norm(v) > 0.0 ? normalized(v) : other; }
+
+/// Whether two vectors certainly have the same length: the same coordinates but for order and sign.
+bool same_length(Vec3 a, Vec3 b) {
+    double x[] = {std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)};
+    double y[] = {std::fabs(b.x), std::fabs(b.y), std::fabs(b.z)};
+    std::ranges::sort(x);
+    std::ranges::sort(y);
+    return std::ranges::equal(x, y);
+}
 
 /// t + step, rounded down.
 double later(double t, double step) {
@@ -144,8 +162,8 @@ double TurningSolver::end_of_period() const {
     double rate = 0.0;
     if (is_zero(w) || is_zero(v)) {
         rate = a_.body.speed() + b_.body.speed();
-    } else if (w.x == v.x && w.y == v.y && w.z == v.z) {
-        rate = a_.body.speed();
+    } else if (same_length(w, v)) {
+        rate = a_.body.speed();  // each of them repeats itself, whatever its axis
     } else if (is_zero(narrow(between_)) && w.x == 0.0 && w.y == 0.0 && v.x == 0.0 && v.y == 0.0) {
         rate = std::fabs(v.z - w.z);  // about one axis
     }
@@ -244,8 +262,7 @@ double TurningSolver::fine_step(const Look& at, const Direction& direction, doub
     const double turning_a = a_.body.speed();
     const double turning_b = b_.body.speed();
     const double turning = spin + turning_a + turning_b;
-    const double rate_error =
-        turning * (at.error + kRateError * at.size) + kRateError * norm(velocity_);
+    const double rate_error = turning * (at.error + kRateError * at.size) + kRateError * norm(velocity_);
 
     struct Piece {
         double value, gap, rate;
@@ -356,7 +373,8 @@ void TurningSolver::measure(const Look& at, const Direction& direction) {
 }
 
 /// A fine step from heights in double-double, along the normal of a feature.
-double TurningSolver::wide_step(const Look& at, const Witness& feature, double longest) {
+double TurningSolver::wide_step(const Look& at, const Witness& feature, double longest,
+                                Direction& direction) {
     if (feature.count < 1 || feature.count > 3) {
         return 0.0;
     }
@@ -381,7 +399,7 @@ double TurningSolver::wide_step(const Look& at, const Witness& feature, double l
     }
     n = times(n, 1.0 / length);
 
-    const Direction direction = direction_of(feature, narrow(n));
+    direction = direction_of(feature, narrow(n));
     measure(at, direction);
     const DoubleDouble level = dot(n, a(0));
     for (std::size_t i = 0; i < a_.height.size(); ++i) {
@@ -391,13 +409,13 @@ double TurningSolver::wide_step(const Look& at, const Witness& feature, double l
     for (std::size_t j = 0; j < b_.height.size(); ++j) {
         b_.height[j] = (dot(n, b_.body.placed_wide(j)) + center).hi;
     }
-    const double error = a_.body.wide_error(at.t) + b_.body.wide_error(at.t) + at.between_error +
-                         kWideHeightError * at.size;
+    const double error =
+        a_.body.wide_error(at.t) + b_.body.wide_error(at.t) + at.between_error + kWideHeightError * at.size;
     return fine_step(at, direction, error, longest);
 }
 
-/// Whether a simplex of the difference certainly holds the origin inside.
-bool TurningSolver::overlap(const Look& at) const {
+/// Whether a simplex of the difference, with b shifted a little, certainly holds the origin inside.
+bool TurningSolver::overlap(const Look& at, Vec3 shift) const {
     const Witness& w = at.found.witness;
     if (w.count != (planar_ ? 3 : 4)) {
         return false;
@@ -405,7 +423,7 @@ bool TurningSolver::overlap(const Look& at) const {
     Vec3 k[4];
     double length[4];
     for (int i = 0; i < w.count; ++i) {
-        k[i] = at.between + b_.body.placed(static_cast<std::size_t>(w.b[i])) -
+        k[i] = at.between + shift + b_.body.placed(static_cast<std::size_t>(w.b[i])) -
                a_.body.placed(static_cast<std::size_t>(w.a[i]));
         length[i] = norm(k[i]);
     }
@@ -429,10 +447,30 @@ bool TurningSolver::overlap(const Look& at) const {
             const double x = length[o[0]];
             const double y = length[o[1]];
             const double z = length[o[2]];
-            count(triple(k[o[0]], k[o[1]], k[o[2]]), error * (x * y + y * z + z * x) + kRateError * x * y * z);
+            count(triple(k[o[0]], k[o[1]], k[o[2]]),
+                  error * (x * y + y * z + z * x) + kRateError * x * y * z);
         }
     }
     return positive == w.count || negative == w.count;
+}
+
+/// The bodies at time t, and whether they certainly overlap then.
+bool TurningSolver::overlap_at(double t, Vec3 start, Look& at) {
+    at = look(t, start);
+    const bool inside = overlap(at, {});
+    if (inside || at.found.length > at.error + kHeightError * at.size) {
+        return inside;
+    }
+    Look near = at;
+    const std::span<const Vec3> corners = planar_ ? std::span<const Vec3>(kFlatCorners) : kCorners;
+    return std::ranges::any_of(kCornerShares, [&](double share) {
+        return std::ranges::all_of(corners, [&](Vec3 corner) {
+            const Vec3 shift = share * at.size * corner;
+            near.b.center = at.b.center + shift;
+            near.found = gjk(near.a, near.b, start);
+            return overlap(near, shift);
+        });
+    });
 }
 
 /// Whether the origin certainly passes through a facet of the difference between the time of the look and t.
@@ -457,7 +495,8 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
         error = std::max(error, a_.body.wide_error(then.t) + b_.body.wide_error(then.t) + then.between_error +
                                     kWideHeightError * at.size);
     }
-    const double speed = norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
+    const double speed =
+        norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
     const double way = (speed * (t - at.t)) * (1.0 + kRateError) + error;  // of any vertex meanwhile
     Vec3 now[3];
     double furthest = 0.0;
@@ -486,10 +525,11 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
         }
     }
     const auto side = [&](const WideVec3* v) {
-        const double value = planar_ ? (v[0].x * v[1].y - v[0].y * v[1].x).hi : dot(v[0], cross(v[1], v[2])).hi;
-        const double doubt = planar_ ? 4.0 * furthest * error + kWideHeightError * furthest * furthest
-                                     : 6.0 * furthest * furthest * error +
-                                           kWideHeightError * furthest * furthest * furthest;
+        const double value =
+            planar_ ? (v[0].x * v[1].y - v[0].y * v[1].x).hi : dot(v[0], cross(v[1], v[2])).hi;
+        const double doubt =
+            planar_ ? 4.0 * furthest * error + kWideHeightError * furthest * furthest
+                    : 6.0 * furthest * furthest * error + kWideHeightError * furthest * furthest * furthest;
         return value > doubt ? 1 : value < -doubt ? -1 : 0;
     };
     return side(k[0]) * side(k[1]) < 0;
@@ -505,8 +545,8 @@ double TurningSolver::proven_contact(const Look& at, const Witness& feature, dou
     for (int i = 0;; ++i, ahead *= kFurtherAhead) {
         const double t = std::min(at.t + ahead, last);
         if (t > lower) {
-            const Look then = look(t, start);
-            if (overlap(then) || ((i < kCrossings || t == last) && crossing(at, feature, t))) {
+            Look then;
+            if (overlap_at(t, start, then) || ((i < kCrossings || t == last) && crossing(at, feature, t))) {
                 return t;
             }
         }
@@ -541,7 +581,6 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
     Witness feature;
     while (out.looks < kMostLooks && a_.body.placeable(t) && b_.body.placeable(t)) {
         ++out.looks;
-        out.lower = t;
         Look at;
         at.t = t;
         place(at);
@@ -553,64 +592,68 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
             // As balls.
             const Vec3 n = normalized(at.between);
             const double rate = kRateError * norm(velocity_) - dot(n, velocity_);
-            const double gap = away * (1.0 - kHeightError) - at.between_error - 0.5 * near * (1.0 + kPlaceError);
+            const double gap =
+                away * (1.0 - kHeightError) - at.between_error - 0.5 * near * (1.0 + kPlaceError);
             const double step = rate > 0.0 ? gap / rate * (1.0 - kHeightError) : kInfinity;
             const double next = later(t, step);
             if (next >= end) {
                 return never();
             }
-            if (!(next > t)) {
-                break;
-            }
-            t = next;
             start = n;
-            continue;
+            if (next > t) {
+                t = next;
+                continue;
+            }
         }
 
-        at = look(t, start);
-        if (t == 0.0 && overlap(at)) {
+        if (t > 0.0) {
+            at = look(t, start);
+        } else if (overlap_at(t, start, at)) {
             out.status = TurningStatus::overlapping;
             out.lower = out.upper = 0.0;
             out.point = in_world(0.5 * (at.found.point_a + at.found.point_b), 0.0);
             return out;
         }
-        const double remaining = end - t;
+        const double remaining = next_up(end - t);
         const double doubt = at.error + kHeightError * at.size;
-        const Vec3 normal = at.found.normal;
-        double step = coarse_step(at, normal);
-        Direction direction{normal, {}, {}};
-        if (at.found.witness.count <= 3) {
-            direction = direction_of(at.found.witness, normal);
+        Direction direction{at.found.normal, {}, {}};
+        double step = coarse_step(at, direction.normal);
+        Witness used = at.found.witness;
+        if (used.count <= 3) {
+            direction = direction_of(used, direction.normal);
             measure(at, direction);
             step = std::max(step, fine_step(at, direction, doubt, remaining));
         }
         if (!(doubt < kGapShare * at.found.gap) || !(later(t, step) > t)) {
-            const double filter = step;
-            step = std::max(step, wide_step(at, at.found.witness, remaining));
-            if (!(step > 0.0)) {
-                step = wide_step(at, feature, remaining);
+            // The feature seen now, or, where the search got lost in rounding, the last one.
+            for (const Witness& candidate : {at.found.witness, feature}) {
+                Direction other;
+                const double wide = wide_step(at, candidate, remaining, other);
+                if (wide > step) {
+                    step = wide;
+                    direction = other;
+                    used = candidate;
+                    out.rung = Rung::wide;
+                }
             }
-            if (step > filter) {
-                out.rung = Rung::wide;
-            }
-        }
-        if (step >= remaining && step > 0.0) {
-            return never();
         }
         const double next = later(t, step);
+        if (step > 0.0 && next >= end) {
+            return never();
+        }
         if (step > 0.0) {
-            feature = at.found.witness;
+            feature = used;
         }
         if (kStepsAhead * step <= tolerance || !(next > t)) {
             const double upper = proven_contact(at, feature, step, t_max, tolerance);
             if (upper < kInfinity || !(next > t)) {
-                out.status = upper < kInfinity      ? TurningStatus::will_touch
-                             : t == 0.0 && step == 0.0 ? TurningStatus::touching
-                                                       : TurningStatus::grazing;
+                out.status = t == 0.0 && step == 0.0 ? TurningStatus::touching
+                             : upper < kInfinity     ? TurningStatus::will_touch
+                                                     : TurningStatus::grazing;
                 out.lower = next;
                 out.upper = upper;
-                const Look then = look(next, normal);
-                const Witness& w = at.found.witness;
+                const Look then = look(next, start);
+                const Witness& w = used;
                 Vec3 middle;
                 for (int i = 0; i < w.count; ++i) {
                     const Vec3 p = a_.body.placed(static_cast<std::size_t>(w.a[i]));
@@ -618,13 +661,14 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
                     middle = middle + (0.5 * w.weight[i]) * (p + q);
                 }
                 out.point = in_world(middle, next);
-                out.normal = unit_or(normal + step * direction.change, normal);
+                out.normal = unit_or(direction.normal + step * direction.change, direction.normal);
                 return out;
             }
         }
         t = next;
-        start = unit_or(normal + step * direction.change, normal);
+        start = unit_or(direction.normal + step * direction.change, direction.normal);
     }
+    out.lower = t;
     return out;
 }
 

@@ -15,10 +15,10 @@ namespace geomsrv {
 
 /// Values of geomsrv.answers.ContactStatus.
 enum class TurningStatus : std::uint8_t {
-    never = 0,          ///< proven apart until t_max
-    will_touch = 1,     ///< proven apart until `lower`, proven in contact at some time until `upper`
-    touching = 2,       ///< at t = 0 neither apart nor overlapping as far as can be told
-    overlapping = 3,    ///< proven at t = 0
+    never = 0,        ///< proven apart until t_max
+    will_touch = 1,   ///< proven apart until `lower`, proven in contact at some time until `upper`
+    touching = 2,     ///< at t = 0 neither apart nor overlapping as far as can be told; in contact by `upper`
+    overlapping = 3,  ///< proven at t = 0
     not_converged = 5,  ///< looks ran out; proven apart until `lower`
     grazing = 6,        ///< proven apart until `lower`; there, neither contact nor its absence can be proven
 };
@@ -28,7 +28,7 @@ struct TurningContact {
     double lower = 0.0;  ///< [s]; NaN for never
     double upper = 0.0;  ///< [s]; infinite where no contact is proven
     Vec3 normal;         ///< unit, from a to b, at `lower`; NaN where there is none
-    Vec3 point;          ///< between the nearest points at `lower`; of overlapping bodies a common one; or NaN
+    Vec3 point;  ///< between the nearest points at `lower`; of overlapping bodies a common one; or NaN
     Rung rung = Rung::filter;
     int looks = 0;  ///< how often the bodies were placed and their nearest points found
 };
@@ -55,9 +55,10 @@ private:
     double coarse_step(const Look& at, Vec3 normal) const;
     double fine_step(const Look& at, const Direction& direction, double gap_error, double longest) const;
     void measure(const Look& at, const Direction& direction);
-    double wide_step(const Look& at, const Witness& feature, double longest);
+    double wide_step(const Look& at, const Witness& feature, double longest, Direction& direction);
     Direction direction_of(const Witness& feature, Vec3 normal) const;
-    bool overlap(const Look& at) const;
+    bool overlap(const Look& at, Vec3 shift) const;
+    bool overlap_at(double t, Vec3 start, Look& at);
     bool crossing(const Look& at, const Witness& feature, double t);
     double proven_contact(const Look& at, const Witness& feature, double step, double t_max,
                           double tolerance);

@@ -125,14 +125,16 @@ void TurningVertices::read(const TurningBody& body) {
             for (int k = 0; k < 3; ++k) {
                 const double e = (corner >> k & 1) != 0 ? body.half[k] : -body.half[k];
                 const double* axis = body.axes + 3 * k;
-                arm = arm + WideVec3{two_product(e, axis[0]), two_product(e, axis[1]), two_product(e, axis[2])};
+                arm =
+                    arm + WideVec3{two_product(e, axis[0]), two_product(e, axis[1]), two_product(e, axis[2])};
             }
             arms_.push_back(arm);
         }
     } else {
         for (std::size_t i = 0; i < body.count; ++i) {
             const double* row = body.rows + static_cast<std::size_t>(body.dimension) * i;
-            arms_.push_back(exact_difference({row[0], row[1], body.dimension == 3 ? row[2] : 0.0}, body.center));
+            arms_.push_back(
+                exact_difference({row[0], row[1], body.dimension == 3 ? row[2] : 0.0}, body.center));
         }
     }
     count_ = arms_.size();

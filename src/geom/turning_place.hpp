@@ -36,8 +36,8 @@ struct TurningBody {
 // A vertex in doubles, relative to the centre it turns about, is off by less than this times its distance
 // from that: an entry of R takes sine and cosine (kTurnError each, at most twice), an axis good to 2 u and 6
 // roundings, 20 u in all; three entries in a row make sqrt(3) of it for each of three coordinates, 60 u for
-// the vector; the arm rounded to double and the products and sums of a row 4 u more.
-inline constexpr double kPlaceError = 64 * kUnitRoundoff;
+// the vector; products and sums of the rows 6 u more, the arm rounded to double 1 u.
+inline constexpr double kPlaceError = 72 * kUnitRoundoff;
 
 // Sine and cosine in doubles: the sum of the series rounds by 2 u, the second order of the angle's low part
 // adds less than u.
