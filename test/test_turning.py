@@ -71,9 +71,12 @@ def judge(pair: Pair, answer: gs.FirstContacts, t_max: float, tolerance: float, 
     if status == ContactStatus.WILL_TOUCH:
         assert lower < upper <= t_max, text
         assert upper - lower <= tolerance or upper == np.nextafter(lower, np.inf), text
-        # At some time in between: thin bodies may have passed each other when it is over.
-        width = Fraction(upper) - Fraction(lower)
-        assert any(meet_at(a, b, Fraction(lower) + width / 2**k) for k in range(60)), text
+        if not meet_at(a, b, Fraction(upper)):
+            # Thin bodies may have passed each other until then.
+            contact = apart_until(a, b, Fraction(upper), most_steps)
+            assert contact < upper and any(meet_at(a, b, contact + Fraction(1, 1 << k)) for k in range(20, 120, 2)), (
+                text
+            )
         assert answer.time == lower and answer.certain[0], text
     return status.name
 
@@ -201,14 +204,14 @@ def test_grazing_is_decided_to_the_ulp(rate: float, size: float) -> None:
         (np.nextafter(5.0, 6.0), gs.NEVER),
     ):
         corner = np.array([(wall, -9.0), (wall + 1.0, -9.0), (wall + 1.0, 9.0), (wall, 9.0)])
-        answer = ask(still(np.array(ROD) * size, corner * size, wa=rate), t_max=2.0, tolerance=1e-6)
+        answer = ask(still(np.array(ROD) * size, corner * size, wa=rate), t_max=2.0, tolerance=1e-6 / abs(rate))
         assert answer.status == status, wall
         assert answer.certain == (status != ContactStatus.GRAZING)
         if status != gs.NEVER:
             # In contact for 4e-8 rad about the expected angle.
-            assert abs(answer.time_lower[0] - expected) <= 1e-7 / abs(rate)
+            assert abs(answer.time_lower[0] - expected) <= 1.1e-6 / abs(rate)
             assert answer.time_lower[0] <= expected * (1 + 1e-14)
-            assert np.allclose(answer.points, [[5.0 * size, 0.0]], atol=1e-6 * size)
+            assert np.allclose(answer.points, [[5.0 * size, 0.0]], atol=6e-6 * size)
 
 
 def test_points_that_meet_graze() -> None:

@@ -4,16 +4,15 @@
 //
 // At time t the nearest points give a direction n along which the bodies are apart.  It is let turn like the
 // feature it stands on, n(s) = R(spin s) n: a face's normal stays one, and that of two crossing edges too.
-// The height of a vertex along n(s), at time t + s, is bounded by its value, its rate and its curvature:
+// The height of a vertex along n(s), at time t + s, is bounded by its value h, its rate h', its curvature h''
+// and a bound J on how fast that changes: for s <= S
 //
-//     | n(s) . x(t + s) - (h + s h') | <= s^2 M / 2
-//
-//     gap(s) >= L(s) = min over b (h + s h') - max over a (h + s h') - s^2 (M_a + M_b) / 2
+//     gap(s) >= L(s) = min over b (h + s h' + s^2 / 2 min(h'' - J S, 0))
+//                    - max over a (h + s h' + s^2 / 2 max(h'' + J S, 0))
 //
 // L is concave, so where it is positive at 0 and at s it is positive between: the bodies are apart until
-// t + s.  No contact is stepped over, however fast or thin the bodies are.  Near contact only s^2 M / 2 is
-// lost, so the steps converge quadratically; a direction that stood still would lose the rate at which a face
-// turns.
+// t + s.  No contact is stepped over, however fast or thin the bodies are.  Near contact the steps converge
+// quadratically; a direction that stood still would lose the rate at which a face turns.
 //
 // Contact is proven by a simplex of the difference b - a that holds the origin inside by more than rounding,
 // or by the intermediate value theorem: a facet of the difference has the origin on one side now and on the
@@ -53,8 +52,9 @@ constexpr double kRateError = 32 * kUnitRoundoff;
 // What heights in double-double round besides their vertices: a dot product and a difference for each body.
 constexpr double kWideHeightError = 0x1p-96;
 
-// Bounds on curvature are sums and products of positive numbers, less than 2^10 operations.
-constexpr double kCurvatureSlack = 1.0 + 0x1p-40;
+// Bounds on third derivatives: products and sums of positive numbers, less than 16 roundings, and a unit
+// vector good to 4 u.
+constexpr double kJoltSlack = 1.0 + 32 * kUnitRoundoff;
 
 // A step in doubles is left to double-double where rounding takes more than this of the gap.
 constexpr double kGapShare = 0x1p-5;
@@ -62,8 +62,8 @@ constexpr double kGapShare = 0x1p-5;
 // How much a root of a piece of L is shortened, so that L is positive there in spite of rounding.
 constexpr double kShortened[] = {0x1p-20, 0x1p-12, 0x1p-8, 0x1p-4, 0x1p-2, 0x1p-1};
 
-// Contact is looked for where a step takes no more than this part of the tolerance, and first at so many
-// steps ahead: after contact, by more than the step's own error.
+// Contact is looked for where the step to come is expected to take no more than this part of the tolerance,
+// and first at so many such steps ahead: after contact, but not long after.
 constexpr double kStepsAhead = 4.0;
 constexpr double kFurtherAhead = 8.0;
 constexpr int kCrossings = 3;  // tries at proving contact by the intermediate value theorem
@@ -148,6 +148,7 @@ void TurningSolver::prepare(const TurningBody& a, const TurningBody& b) {
     for (Side* side : {&a_, &b_}) {
         side->height.resize(side->body.size());
         side->rate.resize(side->body.size());
+        side->bend.resize(side->body.size());
     }
 }
 
@@ -259,38 +260,47 @@ TurningSolver::Direction TurningSolver::direction_of(const Witness& feature, Vec
 double TurningSolver::fine_step(const Look& at, const Direction& direction, double gap_error,
                                 double longest) const {
     const double spin = norm(direction.spin);
-    const double turning_a = a_.body.speed();
-    const double turning_b = b_.body.speed();
-    const double turning = spin + turning_a + turning_b;
-    const double rate_error = turning * (at.error + kRateError * at.size) + kRateError * norm(velocity_);
+    const double turning_a = spin + a_.body.speed();
+    const double turning_b = spin + b_.body.speed();
+    const double turning = std::max(turning_a, turning_b);
+    const double speed = norm(velocity_);
+    const double error = at.error + kRateError * at.size;
+    const double rate_error = 2.0 * turning * error + kRateError * speed;
+    const double bend_error = 2.0 * turning * turning * error + kRateError * turning * speed;
+    // What turns by two angles at once has a third derivative of no more than the sum of the rates, cubed.
+    const double jolt_a = kJoltSlack * turning_a * turning_a * turning_a * at.a.reach;
+    const double jolt_b = kJoltSlack * (turning_b * turning_b * turning_b * b_.body.reach() +
+                                        spin * spin * (spin * norm(at.between) + 3.0 * speed));
 
+    double span = 0.0;  // steps are no longer than this
     struct Piece {
-        double value, gap, rate;
+        double value, gap, rate, bend;
     };
-    // L, and of the vertices that make it the gap and the rate at which it closes.
-    const auto linear = [&](double s) -> Piece {
+    // L, and of the vertices that make it gap, rate at which that closes, and curvature.
+    const auto bound = [&](double s) -> Piece {
+        const double slack_a = jolt_a * span + bend_error;
+        const double slack_b = jolt_b * span + bend_error;
         std::size_t low = 0;
         std::size_t top = 0;
         double least = kInfinity;
         double most = -kInfinity;
         for (std::size_t j = 0; j < b_.height.size(); ++j) {
-            const double value = b_.height[j] + s * b_.rate[j];
-            if (value < least) {
-                least = value;
-                low = j;
-            }
+            const double bend = std::min(b_.bend[j] - slack_b, 0.0);
+            const double value = b_.height[j] + s * (b_.rate[j] + 0.5 * s * bend);
+            low = value < least ? j : low;
+            least = value < least ? value : least;
         }
         for (std::size_t i = 0; i < a_.height.size(); ++i) {
-            const double value = a_.height[i] + s * a_.rate[i];
-            if (value > most) {
-                most = value;
-                top = i;
-            }
+            const double bend = std::max(a_.bend[i] + slack_a, 0.0);
+            const double value = a_.height[i] + s * (a_.rate[i] + 0.5 * s * bend);
+            top = value > most ? i : top;
+            most = value > most ? value : most;
         }
         return {least - most - (gap_error + s * rate_error), b_.height[low] - a_.height[top] - gap_error,
-                a_.rate[top] - b_.rate[low] + rate_error};
+                a_.rate[top] - b_.rate[low] + rate_error,
+                std::max(a_.bend[top] + slack_a, 0.0) - std::min(b_.bend[low] - slack_b, 0.0)};
     };
-    if (!(linear(0.0).value > 0.0)) {
+    if (!(bound(0.0).value > 0.0)) {
         return 0.0;
     }
     double s = longest;
@@ -316,60 +326,54 @@ double TurningSolver::fine_step(const Look& at, const Direction& direction, doub
         s = gap / fastest;
     }
 
-    // M for steps up to s.  Vertices are seen from a point between the bodies, at y, that moves along with
-    // both:
-    //   h'' = n''.y + 2 n'.y' + n.y'',  |n'| = spin, |n''| <= spin^2, y'' = w x (w x r),
-    //   n(s).y'' = r.(w x (w x n(s))).
-    const Vec3 origin = 0.5 * (at.found.point_a + at.found.point_b);
-    const Vec3 drift_a = cross(a_.body.angular(), origin);
-    const Vec3 drift_b = velocity_ + cross(b_.body.angular(), origin - at.between);
-    const double drift = 0.5 * norm(drift_b - drift_a);
-    const auto curvature = [&](const TurningVertices& body, Vec3 center) {
-        double furthest = 0.0;
-        const Vec3 seen = center - origin;
-        for (std::size_t i = 0; i < body.size(); ++i) {
-            const Vec3 y = seen + body.placed(i);
-            furthest = std::max(furthest, dot(y, y));
+    // The shorter the steps allowed, the less their curvature may change.
+    double found = 0.0;
+    for (int round = 0; round < 2; ++round) {
+        span = s;
+        double step = 0.0;
+        for (const double part : kShortened) {
+            const Piece piece = bound(s);
+            if (piece.value > 0.0) {
+                step = s;
+                break;
+            }
+            const double root = std::sqrt(piece.rate * piece.rate + 2.0 * piece.bend * piece.gap);
+            const double next =
+                piece.rate > 0.0 ? 2.0 * piece.gap / (piece.rate + root) : (root - piece.rate) / piece.bend;
+            s = (next < s ? next : s) * (1.0 - part);
         }
-        const double w = body.speed();
-        const double centripetal = w * w * body.reach();
-        const double speed = w * (std::sqrt(furthest) + at.error) + drift + rate_error;
-        const double y = std::sqrt(furthest) + at.error + s * speed + 0.5 * s * s * centripetal;
-        const double tilt = norm(cross(body.angular(), direction.normal)) + kRateError * w + w * spin * s;
-        return spin * spin * y + 2.0 * spin * (speed + s * centripetal) + w * tilt * body.reach();
-    };
-    const double half_curvature =
-        0.5 * kCurvatureSlack * (curvature(a_.body, {}) + curvature(b_.body, at.between));
-
-    for (const double part : kShortened) {
-        const Piece piece = linear(s);
-        if (piece.value - half_curvature * s * s > 0.0) {
-            return s;
+        found = std::max(found, step);
+        if (!(found < 0.5 * span)) {
+            break;
         }
-        const double root = std::sqrt(piece.rate * piece.rate + 4.0 * half_curvature * piece.gap);
-        const double next = piece.rate > 0.0 ? 2.0 * piece.gap / (piece.rate + root)
-                                             : (root - piece.rate) / (2.0 * half_curvature);
-        s = (next < s ? next : s) * (1.0 - part);
+        s = 2.0 * found;
     }
-    return linear(s).value - half_curvature * s * s > 0.0 ? s : 0.0;
+    return found;
 }
 
-/// Heights and rates of all vertices, in doubles.
+/// Of all vertices height, rate and curvature, in doubles.
 void TurningSolver::measure(const Look& at, const Direction& direction) {
+    // (n . y)'' = n'' . y + 2 n' . y' + n . y'',  n' = spin x n,  y' = w x y,  as a product with y.
     const Vec3 n = direction.normal;
-    const auto fill = [&](Side& side, double height, double rate) {
-        const Vec3 turned = direction.change + cross(n, side.body.angular());
+    const Vec3 bent = cross(direction.spin, direction.change);
+    const auto fill = [&](Side& side, double height, double rate, double bend) {
+        const Vec3 w = side.body.angular();
+        const Vec3 across = cross(n, w);
+        const Vec3 first = direction.change + across;
+        const Vec3 second = bent + 2.0 * cross(direction.change, w) + cross(across, w);
         const std::size_t count = side.body.size();
         const double* x = side.body.coordinates();
         const double* y = x + count;
         const double* z = y + count;
         for (std::size_t i = 0; i < count; ++i) {
             side.height[i] = height + (n.x * x[i] + n.y * y[i] + n.z * z[i]);
-            side.rate[i] = rate + (turned.x * x[i] + turned.y * y[i] + turned.z * z[i]);
+            side.rate[i] = rate + (first.x * x[i] + first.y * y[i] + first.z * z[i]);
+            side.bend[i] = bend + (second.x * x[i] + second.y * y[i] + second.z * z[i]);
         }
     };
-    fill(a_, 0.0, 0.0);
-    fill(b_, dot(n, at.between), dot(direction.change, at.between) + dot(n, velocity_));
+    fill(a_, 0.0, 0.0, 0.0);
+    fill(b_, dot(n, at.between), dot(direction.change, at.between) + dot(n, velocity_),
+         dot(bent, at.between) + 2.0 * dot(direction.change, velocity_));
 }
 
 /// A fine step from heights in double-double, along the normal of a feature.
@@ -536,14 +540,14 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
 }
 
 /// A time at or before which contact is proven, not later than a tolerance after the step; or infinity.
-double TurningSolver::proven_contact(const Look& at, const Witness& feature, double step, double t_max,
-                                     double tolerance) {
+double TurningSolver::proven_contact(const Look& at, const Witness& feature, double step, double expected,
+                                     double t_max, double tolerance) {
     const double lower = later(at.t, step);
     const double last = std::min(std::max(later(lower, tolerance), next_up(lower)), t_max);
     const Vec3 start = at.found.normal;
-    double ahead = std::max(kStepsAhead * step, 2.0 * (next_up(at.t) - at.t));
+    double ahead = std::max(kStepsAhead * expected, next_up(lower) - lower);
     for (int i = 0;; ++i, ahead *= kFurtherAhead) {
-        const double t = std::min(at.t + ahead, last);
+        const double t = std::min(lower + ahead, last);
         if (t > lower) {
             Look then;
             if (overlap_at(t, start, then) || ((i < kCrossings || t == last) && crossing(at, feature, t))) {
@@ -579,6 +583,7 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
     double t = 0.0;
     Vec3 start = unit_or(narrow(between_), {1.0, 0.0, 0.0});
     Witness feature;
+    double last_step = 0.0;
     while (out.looks < kMostLooks && a_.body.placeable(t) && b_.body.placeable(t)) {
         ++out.looks;
         Look at;
@@ -644,15 +649,23 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
         if (step > 0.0) {
             feature = used;
         }
-        if (kStepsAhead * step <= tolerance || !(next > t)) {
-            const double upper = proven_contact(at, feature, step, t_max, tolerance);
+        // Where steps converge quadratically, the one to come is this much shorter.
+        const double shrinking = step < last_step ? step / last_step : 1.0;
+        const double expected = step * shrinking * shrinking;
+        last_step = step;
+        if (kStepsAhead * expected <= tolerance || !(next > t)) {
+            const double upper = proven_contact(at, feature, step, expected, t_max, tolerance);
             if (upper < kInfinity || !(next > t)) {
                 out.status = t == 0.0 && step == 0.0 ? TurningStatus::touching
                              : upper < kInfinity     ? TurningStatus::will_touch
                                                      : TurningStatus::grazing;
                 out.lower = next;
                 out.upper = upper;
-                const Look then = look(next, start);
+                Look then;
+                then.t = next;
+                place(then);
+                a_.body.place(next);
+                b_.body.place(next);
                 const Witness& w = used;
                 Vec3 middle;
                 for (int i = 0; i < w.count; ++i) {

@@ -43,7 +43,8 @@ private:
     struct Side {
         TurningVertices body;
         std::vector<double> height;  ///< of the vertices along the direction looked at
-        std::vector<double> rate;    ///< and how fast it changes
+        std::vector<double> rate;    ///< how fast it changes
+        std::vector<double> bend;    ///< and how fast that does
     };
     struct Look;       // the bodies at one time
     struct Direction;  // along which they are apart, and how it turns
@@ -60,7 +61,7 @@ private:
     bool overlap(const Look& at, Vec3 shift) const;
     bool overlap_at(double t, Vec3 start, Look& at);
     bool crossing(const Look& at, const Witness& feature, double t);
-    double proven_contact(const Look& at, const Witness& feature, double step, double t_max,
+    double proven_contact(const Look& at, const Witness& feature, double step, double expected, double t_max,
                           double tolerance);
     Vec3 in_world(Vec3 point, double t) const;
 

@@ -149,6 +149,7 @@ def apart_until(a: Turning, b: Turning, end: Fraction, most_steps: int = 20000) 
         space = Fraction(-1) if n is None else gap(points_a, points_b, n)
         if n is None or space * 3 < good * 2 or space <= 0:
             # Coarse coordinates do until the bodies come close.
+            space = Fraction(-1)
             for bits in (40, 130):
                 p, q = polytope.nearest(_rounded(points_a, bits), _rounded(points_b, bits))
                 n = sub(q, p)
