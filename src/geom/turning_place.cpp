@@ -14,6 +14,9 @@ namespace {
 // Angles beyond this are not reduced [rad]: a body that turns at 1000 rad/s takes 12 days.
 constexpr double kLargestAngle = 0x1p30;
 
+// Lengths not above this have no reciprocal.
+constexpr double kSmallestLength = 0x1p-1000;
+
 // No time beyond this is looked at [s]: products with it must not overflow.
 constexpr double kLargestTime = 0x1p900;
 
@@ -119,16 +122,15 @@ double largest(Vec3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::f
 void TurningVertices::read(const TurningBody& body) {
     arms_.clear();
     if (body.axes != nullptr) {
-        const WideVec3 middle = exact_difference({body.rows[0], body.rows[1], body.rows[2]}, body.center);
-        for (int corner = 0; corner < 8; ++corner) {
-            WideVec3 arm = middle;
-            for (int k = 0; k < 3; ++k) {
-                const double e = (corner >> k & 1) != 0 ? body.half[k] : -body.half[k];
-                const double* axis = body.axes + 3 * k;
-                arm =
-                    arm + WideVec3{two_product(e, axis[0]), two_product(e, axis[1]), two_product(e, axis[2])};
+        arms_.push_back(exact_difference({body.rows[0], body.rows[1], body.rows[2]}, body.center));
+        for (int k = 0; k < 3; ++k) {
+            const double e = body.half[k];
+            const double* axis = body.axes + 3 * k;
+            const WideVec3 side{two_product(e, axis[0]), two_product(e, axis[1]), two_product(e, axis[2])};
+            for (std::size_t i = arms_.size(); i-- > 0;) {
+                arms_.push_back(arms_[i] + side);
+                arms_[i] = arms_[i] - side;
             }
-            arms_.push_back(arm);
         }
     } else {
         for (std::size_t i = 0; i < body.count; ++i) {
@@ -140,24 +142,29 @@ void TurningVertices::read(const TurningBody& body) {
     count_ = arms_.size();
     placed_.resize(3 * count_);
 
-    reach_ = 0.0;
+    double top = 0.0;
     for (const WideVec3& arm : arms_) {
-        // Hypotenuse by the larger side, so that nothing overflows that need not.
-        const Vec3 v = narrow(arm);
-        const double top = largest(v);
-        reach_ = std::max(reach_, top > 0.0 ? top * norm((1.0 / top) * v) : 0.0);
+        top = std::max(top, largest(narrow(arm)));
     }
+    // Divided by the largest coordinate, so that no square overflows or underflows that matters.
+    const double unit = top > kSmallestLength ? 1.0 / top : 0.0;
+    double square = 0.0;
+    for (const WideVec3& arm : arms_) {
+        const Vec3 v = unit * narrow(arm);
+        square = std::max(square, dot(v, v));
+    }
+    reach_ = top > kSmallestLength ? top * std::sqrt(square) : 2.0 * top;
     reach_ *= 1.0 + 16 * kUnitRoundoff;  // what the last lines round, arms rounded to double included
 
     angular_ = body.angular;
-    const double top = largest(angular_);
-    turns_ = top > 0.0;
+    const double rate = largest(angular_);
+    turns_ = rate > 0.0;
     speed_ = {};
     axis_ = {};
     if (turns_) {
         // Scaled, lest squares of slow rates underflow.
-        const PowerOfTwo up(-exponent_of(top));
-        const PowerOfTwo down(exponent_of(top));
+        const PowerOfTwo up(-exponent_of(rate));
+        const PowerOfTwo down(exponent_of(rate));
         const WideVec3 w = widen(up * angular_);
         const DoubleDouble length = sqrt(dot(w, w));
         axis_ = {w.x / length, w.y / length, w.z / length};
