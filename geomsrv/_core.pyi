@@ -46,7 +46,13 @@ def first_contact_polygons(
     accuracy: str = "float64",
 ) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _Rungs]: ...
 def first_contact_turning(
-    a: tuple[_F | _I, ...], b: tuple[_F | _I, ...], motion_a: _F, motion_b: _F, t_max: float, tolerance: float
+    a: tuple[_F | _I, ...],
+    b: tuple[_F | _I, ...],
+    motion_a: _F,
+    motion_b: _F,
+    t_max: float,
+    tolerance: float,
+    slack: _F,
 ) -> tuple[_U, _F, _F, _F, _F, _B, _I]: ...
 def distance_polygons(
     vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool, accuracy: str = "float64"

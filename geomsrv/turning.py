@@ -78,7 +78,7 @@ def first_contact_turning(
         sides.append((_packed(body), motion))
     (body_a, motion_a), (body_b, motion_b) = sides
     status, lower, upper, normal, point, wide, looks = _core.first_contact_turning(
-        body_a, body_b, motion_a, motion_b, end, step
+        body_a, body_b, motion_a, motion_b, end, step, np.zeros((1, 3))
     )
     found = ~np.isnan(point[:, 0]) if contact_set else np.zeros(count, np.bool_)
     certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)

@@ -465,7 +465,7 @@ def test_without_rotation_as_the_closed_form(rng: np.random.Generator) -> None:
         text = reproducer(**pair)
         motion_a, motion_b = (np.array([[*pair[f"v{x}"], 0, 0, 0, 0, *pair[f"c{x}"], 0]], dtype=float) for x in "ab")
         status, lower, upper, normal, *_ = _core.first_contact_turning(
-            (a.vertices, a.offsets), (b.vertices, b.offsets), motion_a, motion_b, 3.0, 1e-9
+            (a.vertices, a.offsets), (b.vertices, b.offsets), motion_a, motion_b, 3.0, 1e-9, np.zeros((1, 3))
         )
         slow = ask({**pair, "wa": 1e-20}, t_max=3.0, tolerance=1e-9)
         for got, low, high in ((status, lower, upper), (slow.status, slow.time_lower, slow.time_upper)):
@@ -554,14 +554,19 @@ def test_the_engine_copies_nothing() -> None:
     hulls = (np.zeros((2, 3)), np.array([0, 1, 2]))
     motion = np.zeros((1, 9))
     for side in (boxes, hulls):
-        assert _core.first_contact_turning(side, boxes, motion, motion, 1.0, 1e-6)[0].tolist() == [3, 3]
+        assert _core.first_contact_turning(side, boxes, motion, motion, 1.0, 1e-6, np.zeros((1, 3)))[0].tolist() == [
+            3,
+            3,
+        ]
         for i, array in enumerate(side):
             for other in (array.astype(np.float32), np.repeat(array, 2, axis=0)[::2], None):
                 with pytest.raises(TypeError, match="turning: bodies must be"):
-                    _core.first_contact_turning((*side[:i], other, *side[i + 1 :]), boxes, motion, motion, 1.0, 1e-6)
+                    _core.first_contact_turning(
+                        (*side[:i], other, *side[i + 1 :]), boxes, motion, motion, 1.0, 1e-6, np.zeros((1, 3))
+                    )
     for other in (motion.astype(np.float32), np.zeros((1, 8)), np.zeros((2, 18))[:, ::2]):
         with pytest.raises(TypeError, match="incompatible function arguments"):
-            _core.first_contact_turning(boxes, boxes, other, motion, 1.0, 1e-6)
+            _core.first_contact_turning(boxes, boxes, other, motion, 1.0, 1e-6, np.zeros((1, 3)))
 
 
 def test_no_rotation_is_not_asked_for() -> None:

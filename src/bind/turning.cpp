@@ -83,7 +83,7 @@ private:
 };
 
 nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
-                                const Motions& motion_b, double t_max, double tolerance) {
+                                const Motions& motion_b, double t_max, double tolerance, const Rows3& slack) {
     const TurningSide a(bodies_a, motion_a);
     const TurningSide b(bodies_b, motion_b);
     const std::size_t count = a.size() == 1 ? b.size() : a.size();
@@ -98,14 +98,15 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
         const nb::gil_scoped_release unlocked;
         TurningSolver solver;
         for (std::size_t i = 0; i < count; ++i) {
-            const TurningContact found = solver.solve(a[i], b[i], t_max, tolerance);
+            const double* row = slack.data() + 3 * (slack.shape(0) == 1 ? 0 : i);
+            const TurningContact found = solver.solve(a[i], b[i], t_max, tolerance, {row[0], row[1], row[2]});
             status.data[i] = static_cast<std::uint8_t>(found.status);
             lower.data[i] = found.lower;
             upper.data[i] = found.upper;
-            for (const auto& [row, v] : {std::pair{normal.data, found.normal}, {point.data, found.point}}) {
-                row[3 * i] = v.x;
-                row[3 * i + 1] = v.y;
-                row[3 * i + 2] = v.z;
+            for (const auto& [to, v] : {std::pair{normal.data, found.normal}, {point.data, found.point}}) {
+                to[3 * i] = v.x;
+                to[3 * i + 1] = v.y;
+                to[3 * i + 2] = v.z;
             }
             wide.data[i] = found.rung == Rung::wide;
             looks.data[i] = found.looks;
@@ -120,7 +121,7 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
 void define_turning(nb::module_& m) {
     m.def("first_contact_turning", first_contact_turning, nb::arg("a"), nb::arg("b"),
           nb::arg("motion_a").noconvert(), nb::arg("motion_b").noconvert(), nb::arg("t_max"),
-          nb::arg("tolerance"));
+          nb::arg("tolerance"), nb::arg("slack").noconvert());
 }
 
 }  // namespace geomsrv::bind

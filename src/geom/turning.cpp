@@ -66,7 +66,8 @@ constexpr double kShortened[] = {0x1p-20, 0x1p-12, 0x1p-8, 0x1p-4, 0x1p-2, 0x1p-
 // and first at so many such steps ahead: after contact, but not long after.
 constexpr double kStepsAhead = 4.0;
 constexpr double kFurtherAhead = 8.0;
-constexpr int kCrossings = 3;  // tries at proving contact by the intermediate value theorem
+constexpr int kLateTries = 40;  // beyond the tolerance, each twice as far, if there is no step at all
+constexpr int kCrossings = 3;   // tries at proving contact by the intermediate value theorem
 
 // 2 pi, rounded up; a period takes four more roundings.
 constexpr double kTwoPi = 0x1.921fb54442d19p+2;
@@ -120,7 +121,7 @@ struct TurningSolver::Direction {
     Vec3 change;  ///< of the normal: spin x normal
 };
 
-void TurningSolver::prepare(const TurningBody& a, const TurningBody& b) {
+void TurningSolver::prepare(const TurningBody& a, const TurningBody& b, const TurningSlack& slack) {
     a_.body.read(a);
     b_.body.read(b);
     planar_ = a.dimension == 2;
@@ -145,6 +146,9 @@ void TurningSolver::prepare(const TurningBody& a, const TurningBody& b) {
         }
     }
     velocity_ = narrow(speed_);
+    // The sums of what may be off round, too.
+    slack_ = {by * slack.margin, by * slack.uncertainty * (1.0 + kHeightError),
+              by * slack.drift * (1.0 + kHeightError)};
     for (Side* side : {&a_, &b_}) {
         side->height.resize(side->body.size());
         side->rate.resize(side->body.size());
@@ -157,7 +161,7 @@ double TurningSolver::end_of_period() const {
     const Vec3 w = a_.body.angular();
     const Vec3 v = b_.body.angular();
     const auto is_zero = [](Vec3 x) { return x.x == 0.0 && x.y == 0.0 && x.z == 0.0; };
-    if (!is_zero(velocity_)) {
+    if (!is_zero(velocity_) || slack_.drift > 0.0) {
         return kInfinity;
     }
     double rate = 0.0;
@@ -188,8 +192,8 @@ TurningSolver::Look TurningSolver::look(double t, Vec3 start) {
     at.b.center = at.between;
     const double away = norm(at.between);
     at.b.reach += away;
-    at.size = at.a.reach + at.b.reach;
-    at.error = at.a.error + at.b.error + kUnitRoundoff * away + at.between_error;
+    at.size = at.a.reach + at.b.reach + slack_.margin;
+    at.error = at.a.error + at.b.error + kUnitRoundoff * away + at.between_error + vague(t);
     at.found = gjk(at.a, at.b, start);
     return at;
 }
@@ -197,8 +201,8 @@ TurningSolver::Look TurningSolver::look(double t, Vec3 start) {
 /// How long the bodies certainly stay apart along a direction that stands still.  For each of them the faster
 /// of two bounds counts: its vertices move no faster than w r, and never leave the ball about its centre.
 double TurningSolver::coarse_step(const Look& at, Vec3 normal) const {
-    const double error = at.error + kHeightError * at.size;
-    const double closing = kRateError * norm(velocity_) - dot(normal, velocity_);
+    const double error = at.error + kHeightError * at.size + slack_.margin;
+    const double closing = kRateError * norm(velocity_) - dot(normal, velocity_) + slack_.drift;
     const double middle = dot(normal, at.between);
     const auto sweep = [&](const TurningVertices& body) {
         return (norm(cross(normal, body.angular())) + kRateError * body.speed()) * body.reach();
@@ -265,7 +269,7 @@ double TurningSolver::fine_step(const Look& at, const Direction& direction, doub
     const double turning = std::max(turning_a, turning_b);
     const double speed = norm(velocity_);
     const double error = at.error + kRateError * at.size;
-    const double rate_error = 2.0 * turning * error + kRateError * speed;
+    const double rate_error = 2.0 * turning * error + kRateError * speed + slack_.drift;
     const double bend_error = 2.0 * turning * turning * error + kRateError * turning * speed;
     // What turns by two angles at once has a third derivative of no more than the sum of the rates, cubed.
     const double jolt_a = kJoltSlack * turning_a * turning_a * turning_a * at.a.reach;
@@ -415,12 +419,16 @@ double TurningSolver::wide_step(const Look& at, const Witness& feature, double l
     }
     const double error =
         a_.body.wide_error(at.t) + b_.body.wide_error(at.t) + at.between_error + kWideHeightError * at.size;
-    return fine_step(at, direction, error, longest);
+    // A margin rounds like the heights that are compared with it.
+    return fine_step(at, direction, error + vague(at.t) + slack_.margin * (1.0 + kHeightError), longest);
 }
 
 /// Whether a simplex of the difference, with b shifted a little, certainly holds the origin inside.
 bool TurningSolver::overlap(const Look& at, Vec3 shift) const {
     const Witness& w = at.found.witness;
+    if (slack_.margin > 0.0 && at.found.length + kMemberError * at.size + at.error < slack_.margin) {
+        return true;
+    }
     if (w.count != (planar_ ? 3 : 4)) {
         return false;
     }
@@ -480,7 +488,7 @@ bool TurningSolver::overlap_at(double t, Vec3 start, Look& at) {
 /// Whether the origin certainly passes through a facet of the difference between the time of the look and t.
 bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
     const int count = planar_ ? 2 : 3;
-    if (feature.count != count) {
+    if (feature.count != count || slack_.margin > 0.0) {
         return false;
     }
     WideVec3 k[2][3];  // now and later
@@ -497,7 +505,7 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
                          a_.body.placed_wide(static_cast<std::size_t>(feature.a[i]));
         }
         error = std::max(error, a_.body.wide_error(then.t) + b_.body.wide_error(then.t) + then.between_error +
-                                    kWideHeightError * at.size);
+                                    kWideHeightError * at.size + vague(then.t));
     }
     const double speed =
         norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
@@ -539,22 +547,29 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
     return side(k[0]) * side(k[1]) < 0;
 }
 
-/// A time at or before which contact is proven, not later than a tolerance after the step; or infinity.
+/// A time at or before which contact is proven; not later than a tolerance after the step, unless there is
+/// none.  Infinity if nothing is found.
 double TurningSolver::proven_contact(const Look& at, const Witness& feature, double step, double expected,
                                      double t_max, double tolerance) {
     const double lower = later(at.t, step);
+    const bool stuck = !(lower > at.t);
     const double last = std::min(std::max(later(lower, tolerance), next_up(lower)), t_max);
     const Vec3 start = at.found.normal;
     double ahead = std::max(kStepsAhead * expected, next_up(lower) - lower);
+    int late = 0;
     for (int i = 0;; ++i, ahead *= kFurtherAhead) {
-        const double t = std::min(lower + ahead, last);
+        double t = std::min(lower + ahead, last);
+        if (!(t < last) && late > 0) {
+            // Too late for the tolerance, but better than nothing.
+            t = std::min(lower + std::ldexp(tolerance, late), t_max);
+        }
         if (t > lower) {
             Look then;
             if (overlap_at(t, start, then) || ((i < kCrossings || t == last) && crossing(at, feature, t))) {
                 return t;
             }
         }
-        if (!(t < last)) {
+        if (!(t < last) && (!stuck || !(t < t_max) || ++late > kLateTries)) {
             return kInfinity;
         }
     }
@@ -566,8 +581,8 @@ Vec3 TurningSolver::in_world(Vec3 point, double t) const {
 }
 
 TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, double t_max,
-                                    double tolerance) {
-    prepare(a, b);
+                                    double tolerance, const TurningSlack& slack) {
+    prepare(a, b, slack);
     const double end = std::min(t_max, end_of_period());
     const double near = kFar * (a_.body.reach() + b_.body.reach());
     TurningContact out;
@@ -596,10 +611,12 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
         if (away > near) {
             // As balls.
             const Vec3 n = normalized(at.between);
-            const double rate = kRateError * norm(velocity_) - dot(n, velocity_);
-            const double gap =
-                away * (1.0 - kHeightError) - at.between_error - 0.5 * near * (1.0 + kPlaceError);
-            const double step = rate > 0.0 ? gap / rate * (1.0 - kHeightError) : kInfinity;
+            const double rate = kRateError * norm(velocity_) - dot(n, velocity_) + slack_.drift;
+            const double gap = away * (1.0 - kHeightError) - at.between_error -
+                               (0.5 * near + slack_.margin) * (1.0 + kPlaceError) - vague(t);
+            const double step = !(gap > 0.0) ? 0.0
+                                : rate > 0.0 ? gap / rate * (1.0 - kHeightError)
+                                             : kInfinity;
             const double next = later(t, step);
             if (next >= end) {
                 return never();
@@ -627,9 +644,9 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
         if (used.count <= 3) {
             direction = direction_of(used, direction.normal);
             measure(at, direction);
-            step = std::max(step, fine_step(at, direction, doubt, remaining));
+            step = std::max(step, fine_step(at, direction, doubt + slack_.margin, remaining));
         }
-        if (!(doubt < kGapShare * at.found.gap) || !(later(t, step) > t)) {
+        if (!(doubt < kGapShare * (at.found.gap - slack_.margin)) || !(later(t, step) > t)) {
             // The feature seen now, or, where the search got lost in rounding, the last one.
             for (const Witness& candidate : {at.found.witness, feature}) {
                 Direction other;
@@ -656,8 +673,9 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
         if (kStepsAhead * expected <= tolerance || !(next > t)) {
             const double upper = proven_contact(at, feature, step, expected, t_max, tolerance);
             if (upper < kInfinity || !(next > t)) {
+                const bool in_time = upper - next <= tolerance || upper == next_up(next);
                 out.status = t == 0.0 && step == 0.0 ? TurningStatus::touching
-                             : upper < kInfinity     ? TurningStatus::will_touch
+                             : in_time               ? TurningStatus::will_touch
                                                      : TurningStatus::grazing;
                 out.lower = next;
                 out.upper = upper;

@@ -23,6 +23,13 @@ enum class TurningStatus : std::uint8_t {
     grazing = 6,        ///< proven apart until `lower`; there, neither contact nor its absence can be proven
 };
 
+/// What else is to be told about a pair.
+struct TurningSlack {
+    double margin = 0.0;  ///< bodies no further apart than this are in contact [m]; radii of round bodies
+    double uncertainty = 0.0;  ///< by how much the bodies may be off, added up [m]
+    double drift = 0.0;        ///< by how much their velocities may be [m/s]
+};
+
 struct TurningContact {
     TurningStatus status = TurningStatus::not_converged;
     double lower = 0.0;  ///< [s]; NaN for never
@@ -36,8 +43,10 @@ struct TurningContact {
 /// Holds scratch memory, which grows with the largest body seen.
 class TurningSolver {
 public:
-    /// Contact within [0, t_max], t_max >= 0 or infinite, to `tolerance` > 0 [s].
-    TurningContact solve(const TurningBody& a, const TurningBody& b, double t_max, double tolerance);
+    /// Contact within [0, t_max], t_max >= 0 or infinite, to `tolerance` > 0 [s]; for all bodies that the
+    /// slack allows.
+    TurningContact solve(const TurningBody& a, const TurningBody& b, double t_max, double tolerance,
+                         const TurningSlack& slack = {});
 
 private:
     struct Side {
@@ -49,7 +58,7 @@ private:
     struct Look;       // the bodies at one time
     struct Direction;  // along which they are apart, and how it turns
 
-    void prepare(const TurningBody& a, const TurningBody& b);
+    void prepare(const TurningBody& a, const TurningBody& b, const TurningSlack& slack);
     double end_of_period() const;
     Look look(double t, Vec3 start);
     void place(Look& at) const;
@@ -63,6 +72,7 @@ private:
     bool crossing(const Look& at, const Witness& feature, double t);
     double proven_contact(const Look& at, const Witness& feature, double step, double expected, double t_max,
                           double tolerance);
+    double vague(double t) const { return slack_.uncertainty + slack_.drift * t; }
     Vec3 in_world(Vec3 point, double t) const;
 
     Side a_, b_;
@@ -70,6 +80,7 @@ private:
     int exponent_ = 0;          // lengths are times 2^exponent
     WideVec3 between_, speed_;  // from the centre of a to that of b, and how fast it changes
     Vec3 velocity_;             // the same, in doubles
+    TurningSlack slack_;
     Vec3 center_a_, velocity_a_;
 };
 
