@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.visibility import boxed_kinds
 from geomsrv.world import World, supported_kinds
 
@@ -47,14 +48,16 @@ def _first_contacts(world: World) -> list[str]:
     followed = int((moving & ~world.turns)[polygons].sum())
     if followed:
         lines.append(f"- followed in translation: {_count(followed, 'polygon')}")
-    turning = int(world.turns[polygons].sum())
-    if turning:
+    known = followed_in_turning(world)
+    if turning := int((world.turns & known).sum()):
+        lines.append(f"- followed while they turn: {_count(turning, 'object')}")
+    elif not world.turns.any():
+        lines.append("- rotation: skipped, nothing turns")
+    if lost := int((world.turns & ~known)[polygons].sum()):
+        lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
+    if strange := int((moving & ~(world.turns & known))[solids].sum()):
         lines.append(
-            f"- unsupported unless in contact now: {_count(turning, 'polygon')} that turn or move unpredictably"
-        )
-    if moving[solids].any():
-        lines.append(
-            f"- unsupported unless in contact now: {_count(int(moving[solids].sum()), 'moving solid')}, "
+            f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "
             "against whatever moves differently"
         )
     return lines
