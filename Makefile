@@ -7,7 +7,7 @@ HPP := $(wildcard src/*/*.hpp)
 # would keep them from finding those of .venv.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help build test soak hard demo bench lint format colcon clean
+.PHONY: help build test soak hard demo bench price lint format colcon clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):[^#]*## /\1\t/p' Makefile | expand -t 10
@@ -30,6 +30,9 @@ demo: build  ## a real robot, a node and a client; writes a picture
 bench: build  ## time the queries against numpy and python-fcl
 	$(BIN)/python bench/run.py $(ARGS)
 
+price: build  ## what accuracy costs here; tables, figures and a page in price_output
+	$(BIN)/geomsrv price $(ARGS)
+
 lint: build  ## check format, names and types
 	$(BIN)/clang-format --dry-run -Werror $(CPP) $(HPP)
 	printf '%s\n' $(CPP) | xargs -P 2 -n 1 $(BIN)/clang-tidy -p build --quiet
@@ -46,4 +49,4 @@ colcon: build  ## colcon build and colcon test in a scratch workspace
 	tools/colcon
 
 clean:  ## remove everything that make has made
-	rm -rf .venv build demo_output
+	rm -rf .venv build demo_output price_output

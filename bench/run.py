@@ -226,7 +226,7 @@ def prices(quick: bool) -> list[Price]:
         table.append(Price(f"exact: {name}", most, items, call, exact, most_ns=most_ns))
         if most_ns is None and most < 20.0:
             proven = lambda call=call: call(certificates=True)  # noqa: E731
-            table.append(Price(f"certificate: {name}", 3.0, items, call, proven))
+            table.append(Price(f"certificate: {name}", 2.0, items, call, proven))
     return table
 
 

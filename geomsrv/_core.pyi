@@ -9,9 +9,9 @@ _F = NDArray[np.float64]
 _I = NDArray[np.int64]
 _U = NDArray[np.uint8]
 _B = NDArray[np.bool_]
-# distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,)
-_Distances = tuple[_F, _F, _F, _F, _F, _F, _U]
-# the same, then rung (n,) (rung.hpp) and, as evidence, the simplex (n, 4, 2) of vertices of the difference
+# distance, lower, upper (n,), point_a, point_b, normal (n, d), status (n,), rung (n,) (rung.hpp)
+_Distances = tuple[_F, _F, _F, _F, _F, _F, _U, _U]
+# the same, then as evidence the simplex (n, 4, 2) of vertices of the difference
 _ProvenDistances = tuple[_F, _F, _F, _F, _F, _F, _U, _U, NDArray[np.int32] | None]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
@@ -101,6 +101,8 @@ def distance_placed(
     pairs: _I,
     pose_rounding: float,
     penetration: bool,
+    accuracy: str = "float64",
+    frusta: _F | None = None,
 ) -> _Distances: ...
 def overlapping_pairs(lower: _F, upper: _F) -> _I: ...
 def overlapping_pairs_between(lower_a: _F, upper_a: _F, lower_b: _F, upper_b: _F) -> _I: ...

@@ -39,32 +39,39 @@ Pairs = NDArray[np.int32]
 Prover = Callable[[Any, int], Record]
 
 
-def certify_cull(frustum: Frustum, boxes: Boxes, simplex: Any, beyond: Any) -> Prover:
-    """Records of a `Cull`; the evidence is that of cull_evidence.hpp, (n, 4, 2) and (n, 2)."""
+def certify_cull(frustum: Frustum, boxes: Boxes, found: Callable[[int], Any]) -> Prover:
+    """Records of a `Cull`; `found` finds the evidence of one item, that of cull_evidence.hpp: (4, 2) and (2,)."""
 
     def record(answer: Cull, i: int) -> Record:
         sides, state = (_item(frustum, i), _item(boxes, i)), CullState(int(answer.state[i]))
         if not answer.certain[i]:
             return _record("cull", *sides, {}, {})
         evidence: Record = {}
-        pairs, (corner, plane) = _listed(simplex, i), beyond[i].tolist()
+        simplex, beyond = found(i)
+        pairs, (corner, plane) = _used(simplex), beyond.tolist()
         if plane >= 0:
             evidence["beyond"] = [max(corner, 0), plane]
         if pairs:
             evidence["simplex"] = pairs
         elif state == CullState.INTERSECTS:
-            evidence["inside"] = [k for _, k in simplex[i].tolist() if k >= 0]
+            evidence["inside"] = [k for _, k in simplex.tolist() if k >= 0]
         return _record("cull", *sides, {"state": state.name}, evidence)
 
     return record
 
 
 def certify_distances(
-    a: Any, b: Any, simplex: Pairs | None = None, *, poses_ab: FloatArray | None = None, signed: bool = False
+    a: Any,
+    b: Any,
+    simplex: Pairs | Callable[[int], Pairs] | None = None,
+    *,
+    poses_ab: FloatArray | None = None,
+    signed: bool = False,
 ) -> Prover:
     """Records of `Distances` or `Booleans` of batches, of a frustum and points, or of shapes at poses.
 
-    `simplex`: (n, k, 2) pairs of vertices where the engine ended, unused rows -1; None if it tells none.
+    `simplex`: (n, k, 2) pairs of vertices where the engine ended, unused rows -1; or what finds those of one item;
+    None if the engine tells none.
     `signed`: negative distances are penetration depths.
     """
 
@@ -127,8 +134,14 @@ def _record(query: str, a: Record, b: Record, claim: Record, evidence: Record) -
     return {"query": query, "a": a, "b": b, "claim": claim, "evidence": evidence}
 
 
-def _listed(simplex: Pairs | None, i: int) -> list[list[int]]:
-    return [] if simplex is None else [pair for pair in simplex[i].tolist() if pair[0] >= 0]
+def _listed(simplex: Pairs | Callable[[int], Pairs] | None, i: int) -> list[list[int]]:
+    if simplex is None:
+        return []
+    return _used(simplex(i) if callable(simplex) else simplex[i])
+
+
+def _used(pairs: Pairs) -> list[list[int]]:
+    return [pair for pair in pairs.tolist() if pair[0] >= 0]
 
 
 # ------------------------------------------------------------------------------------------------------- bodies

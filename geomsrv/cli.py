@@ -35,12 +35,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     crosscheck.add_argument("--cases", type=Path, metavar="FILE", help="JSON lines, by default those installed")
     crosscheck.add_argument("--verbose", action="store_true", help="name every wrong answer of FCL and Coal, too")
 
+    price = commands.add_parser("price", help="what accuracy costs here: error and time of every way to answer a query")
+    price.add_argument("--quick", action="store_true", help="fewer items, fewer turns: rough figures in two minutes")
+    price.add_argument("--only", default="", metavar="TEXT", help="queries whose name holds these words")
+    price.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here; --explain reads them")
+    price.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        default=Path("price_output"),
+        help="where pictures and pages go (%(default)s)",
+    )
+    price.add_argument("--page", type=Path, metavar="FILE", help="also write a Markdown page that shows the pictures")
+    price.add_argument(
+        "--explain", metavar="REQUEST", help="what would run, and its price: 'distance box-capsule 1e-6'"
+    )
+
     arguments = list(sys.argv[1:] if argv is None else argv)
     command, rest = arguments[:1], arguments[1:]
     if not (command and command[0] in PASSED_ON):
         given = parser.parse_args(arguments)
         if given.command == "crosscheck":
             return _crosscheck([given.cases] if given.cases else None, given.verbose)
+        if given.command == "price":
+            return _price(given)
         return _verify(given.files) if given.command == "verify" else _self_check()
     if command == ["demo"]:
         from geomsrv import demo
@@ -88,6 +106,19 @@ def _crosscheck(files: Sequence[Path] | None, verbose: bool) -> int:
         if ours or verbose:
             print(f"{'WRONG ' if ours else ''}{line}")
     return 1 if report.engine_wrong else 0
+
+
+def _price(given: argparse.Namespace) -> int:
+    from geomsrv.errors import GeometryError
+    from geomsrv.price import run
+
+    try:
+        return run(given.only, given.quick, given.out, given.json, given.page, given.explain, _version())
+    except ModuleNotFoundError as missing:
+        print(f"geomsrv price needs {missing.name}: pip install rich matplotlib", file=sys.stderr)
+    except (OSError, GeometryError) as error:
+        print(f"geomsrv price: {error}", file=sys.stderr)
+    return 2
 
 
 SHOWN = 3  # failures that are told one by one

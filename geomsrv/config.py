@@ -12,7 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
-from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv import _validate
+from geomsrv.errors import GeometryError
+from geomsrv.queries import TIERS
 
 __all__ = ["Config", "Setting", "settings"]
 
@@ -104,7 +106,7 @@ class Config:
         "float64",
         "accuracy",
         "Tier of the topics, and of service requests that name none.",
-        choices=("bound", "float32", "float64", "exact"),
+        choices=_validate.ACCURACIES,
     )
     max_rate: float = _setting(
         30.0,
@@ -184,8 +186,7 @@ class Config:
             fault = setting.fault(getattr(self, item.name), item.default)
             if fault:
                 raise GeometryError(fault)
-        if self.accuracy != "float64":
-            raise NotAvailableError(f"accuracy={self.accuracy!r} is not available yet; this version answers 'float64'")
+        _validate.accuracy(self.accuracy, TIERS)
         if not self.camera_far > self.camera_near:
             raise GeometryError(f"camera.far must be > camera.near = {self.camera_near:g}, got {self.camera_far:g}")
         # Within float32 drift; what is left of it is normalised away.

@@ -58,6 +58,9 @@ IntArray = NDArray[np.int64]
 # Pairs judged at a time; FCL takes some 10 ms for them, and the counters are that fresh.
 BATCH_PAIRS = 256
 
+# Tiers that FCL can be wrong about: bounding volumes claim too little, and single precision has points of its own.
+COMPARED = _validate.CERTIFIED_ACCURACIES
+
 # Differences kept for `CrossCheck.poll`, and, of either sort, for `Tally.recent`.
 MAX_UNPOLLED = 1000
 MAX_RECENT = 10
@@ -190,14 +193,14 @@ class CrossCheck:
         Returns
         -------
         int
-            How many pairs were queued; in mode "off" always 0.
+            How many pairs were queued; in mode "off", and at tiers that are not `COMPARED`, always 0.
 
         Raises
         ------
         GeometryError
             Names the argument and the fault.
         """
-        if self.mode == Mode.OFF:
+        if self.mode == Mode.OFF or answers.cost.accuracy not in COMPARED:
             return 0
         poses = _validate.poses(poses_ab, "poses_ab")
         count = len(poses)
@@ -237,9 +240,9 @@ class CrossCheck:
         Returns
         -------
         int
-            How many pairs were queued; in mode "off" always 0.
+            How many pairs were queued; in mode "off", and at tiers that are not `COMPARED`, always 0.
         """
-        if self.mode == Mode.OFF:
+        if self.mode == Mode.OFF or answer.cost.accuracy not in COMPARED:
             return 0
         table = [world.table.shapes[k] for k in world.shape.tolist()]
         shapes = [(table[i], table[j]) for i, j in pairs.tolist()]
@@ -285,7 +288,7 @@ class CrossCheck:
         Returns
         -------
         int
-            How many pairs were queued; in mode "off" always 0.
+            How many pairs were queued; in mode "off", and at tiers that are not `COMPARED`, always 0.
         """
         if self.mode == Mode.OFF:
             return 0

@@ -183,6 +183,7 @@ class Engine:
                 (not config.effects_first_contact, "switched off by effects.first_contact"),
                 (config.horizon == 0.0, "the horizon is 0"),
                 (self.turning_count == 0, "nothing turns"),
+                (config.accuracy != "float64", f"turning objects are followed at float64, not at {config.accuracy}"),
             ),
             _stage("contact_set", *contact, (not config.effects_contact_set, "switched off by effects.contact_set")),
             _stage(

@@ -40,8 +40,6 @@ DEFINITION = struct.Struct("<q16s4d")  # id, kind, the four parameters of `geoms
 REQUEST = np.dtype([("a", "<i8"), ("b", "<i8"), ("pose", "<f8", 7)])
 REPLY = np.dtype([("outcome", "u1"), ("distance", "<f8")])
 
-KINDS = ("sphere", "capsule", "box", "convex", "half_space")  #: shapes that FCL is asked about
-
 # Yields the processor to the process whose answers are checked; the check is never urgent.
 NICENESS = 10
 
@@ -56,6 +54,8 @@ class Outcome(IntEnum):
 
 class Peer:
     """Shapes by id, and what another engine says of two of them."""
+
+    module: Any
 
     def __init__(self) -> None:
         self._pending: dict[int, bytes] = {}
@@ -83,6 +83,18 @@ class Peer:
         return found
 
     def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
+        """The peers name shapes alike, but for hulls."""
+        if kind == "sphere":
+            return self.module.Sphere(params[0])
+        if kind == "capsule":
+            return self.module.Capsule(params[0], 2.0 * params[1])
+        if kind == "box":
+            return self.module.Box(*(2.0 * half for half in params[:3]))
+        if kind == "half_space":
+            return self.module.Halfspace(np.array(params[:3]), params[3])
+        return self._hull(vertices)
+
+    def _hull(self, vertices: NDArray[np.float64]) -> Any:
         raise NotImplementedError
 
     def measure(self, a: int, b: int, pose: NDArray[np.float64]) -> tuple[int, float]:
@@ -103,18 +115,10 @@ class Fcl(Peer):
 
     def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
         """An object that stays at the origin, and one that gets moved."""
-        geometry = self._geometry(kind, params, vertices)
+        geometry = super()._made(kind, params, vertices)
         return tuple(self.module.CollisionObject(geometry) for _ in range(2))
 
-    def _geometry(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
-        if kind == "sphere":
-            return self.module.Sphere(params[0])
-        if kind == "capsule":
-            return self.module.Capsule(params[0], 2.0 * params[1])
-        if kind == "box":
-            return self.module.Box(*(2.0 * half for half in params[:3]))
-        if kind == "half_space":
-            return self.module.Halfspace(np.array(params[:3]), params[3])
+    def _hull(self, vertices: NDArray[np.float64]) -> Any:
         # Without faces FCL finds support points by looking at every vertex instead of walking along edges:
         # the same answers, also for flat hulls, and nobody has to compute a hull.
         return self.module.Convex(vertices, 0, np.zeros(0, np.int64))
@@ -149,15 +153,7 @@ class Coal(Peer):
         self.module = coal
         self.version = str(coal.__version__)
 
-    def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
-        if kind == "sphere":
-            return self.module.Sphere(params[0])
-        if kind == "capsule":
-            return self.module.Capsule(params[0], 2.0 * params[1])
-        if kind == "box":
-            return self.module.Box(*(2.0 * half for half in params[:3]))
-        if kind == "half_space":
-            return self.module.Halfspace(np.array(params[:3]), params[3])
+    def _hull(self, vertices: NDArray[np.float64]) -> Any:
         points = self.module.StdVec_Vec3s()
         points.extend(list(vertices))
         if len(vertices) > self.SMALL:

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Answers for listed pairs of objects, in the fixed frame, with intervals that cover every rounding on the way.
 
-The engine sees a pair through the pose of b in a; here that pose is computed, and what its rounding may have
-changed is added to the interval, together with the objects' own uncertainty.
+The engine sees a pair of solids through the pose of b in a; that pose is computed once and from then on taken
+literally, and what its rounding may have changed is added to the interval, together with the objects' own uncertainty.
+Polygons are placed in the plane once, and those numbers are taken literally.  So at each tier the answer is that of
+`distance` or `first_contact` for these numbers, but for the wider interval.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +20,7 @@ from numpy.typing import NDArray
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
+from geomsrv.queries import RUNGS
 from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 
 __all__ = [
@@ -35,9 +39,9 @@ __all__ = [
 # the reach of a body from its origin.  With u = 2^-53 and Q the exact rotation of a unit quaternion that is
 # off by s = |q| - 1, |s| <= 3 u: a rotation matrix computed from it is off by sqrt(99) u (9 entries, up to 5
 # u on the diagonal and 2 u beside it) + 4 s = 22 u.  That holds for R_a, which moves points of a, for R_b,
-# and, with the doubled s of a product, once more (50 u) for the matrix the engine computes from the relative
-# quaternion.  That product of quaternions errs by 4 u in each of four parts, which turns by 16 u.  So r_a
-# counts 22 u, r_b 22 + 50 + 16 = 88 u, |p_ab| 22 u + 6 u for its own arithmetic.
+# and once more for the matrix the engine computes from the relative quaternion.  That is a product, which
+# errs by 4 u in each of four parts and so turns by 16 u; normalising it turns it by 4 u more at most.  So r_a
+# counts 22 u, r_b 22 + 22 + 20 = 64 u, |p_ab| 22 u + 6 u for its own arithmetic; half as much again is added.
 RELATIVE_POSE_ROUNDING = 96.0 * ROUNDOFF
 
 # Shifting a ring: velocity difference 1 u, product 1 u, sum 1 u of numbers up to twice the larger coordinate, in
@@ -157,11 +161,17 @@ def count_kinds(world: World, pairs: IntArray, counts: Counter[str]) -> None:
         counts[f"narrow {name}"] += number
 
 
+def count_rungs(tier: str, totals: Iterable[int], counts: Counter[str]) -> None:
+    """Count pairs by what it took to answer them, in the order of `RUNGS`; at float64 that is the same for all."""
+    if tier != "float64":
+        counts.update({name: int(total) for name, total in zip(RUNGS, totals, strict=True) if total})
+
+
 # --------------------------------------------------------------------------------------------------- distance
 
 
 def distance_rows(
-    world: World, pairs: IntArray, penetration: bool, counts: Counter[str]
+    world: World, pairs: IntArray, penetration: bool, tier: str, counts: Counter[str]
 ) -> tuple[DistanceRows, Unsupported]:
     """Distance of every pair, and the pairs that have no kernel."""
     planar = world.planar[pairs[:, 0]]
@@ -172,7 +182,7 @@ def distance_rows(
     for part, kernel in ((solids[answered], solid_distances), (polygons, polygon_distances)):
         if len(part):
             count_kinds(world, part, counts)
-            parts.append(kernel(world, part, penetration))
+            parts.append(kernel(world, part, penetration, tier, counts))
     rows = DistanceRows.joined(parts)
     missing = [Unsupported.of_kinds(world, solids[~answered], NO_DISTANCE)]
     # A kernel may decline a pair for other reasons than its kinds.
@@ -183,15 +193,18 @@ def distance_rows(
     return rows, Unsupported.joined(missing)
 
 
-def solid_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+def solid_distances(world: World, pairs: IntArray, penetration: bool, tier: str, counts: Counter[str]) -> DistanceRows:
     """Distances of solids, in any order; pairs without a kernel keep their rows."""
-    return DistanceRows(pairs, *(*placed_distances(world, pairs, penetration), world.uncertainty[pairs].sum(axis=1)))
+    columns = placed_distances(world, pairs, penetration, tier, counts)
+    return DistanceRows(pairs, *(*columns, world.uncertainty[pairs].sum(axis=1)))
 
 
-def placed_distances(world: World, pairs: IntArray, penetration: bool) -> tuple[Any, ...]:
+def placed_distances(
+    world: World, pairs: IntArray, penetration: bool, tier: str, counts: Counter[str]
+) -> tuple[Any, ...]:
     """Distance, lower, upper, point_a, point_b, normal and status of solids, in any order."""
     table = world.table
-    return _core.distance_placed(
+    *columns, rung = _core.distance_placed(
         *table.packed,
         table.reach,
         world.shape,
@@ -200,18 +213,24 @@ def placed_distances(world: World, pairs: IntArray, penetration: bool) -> tuple[
         np.ascontiguousarray(pairs),
         RELATIVE_POSE_ROUNDING,
         penetration,
+        tier,
+        table.frusta,
     )
+    if tier != "float64":
+        count_rungs(tier, np.bincount(rung[columns[-1] != DistanceStatus.UNSUPPORTED], minlength=len(RUNGS)), counts)
+    return tuple(columns)
 
 
 def relative_poses(world: World, pairs: IntArray) -> FloatArray:
-    """(k, 7) pose of the second object of each pair in the first."""
+    """(k, 7) pose of the second object of each pair in the first: normalised, as queries do, that of the engine."""
     i, j = pairs[:, 0], pairs[:, 1]
-    step = world.poses[j, :3] - world.poses[i, :3]
+    step = (world.poses[j, :3] - world.poses[i, :3])[:, :, None]
+    turn = world.rotations[i]
     ax, ay, az, aw = world.poses[i, 3:].T
     bx, by, bz, bw = world.poses[j, 3:].T
     return np.column_stack(
         [
-            np.einsum("kji,kj->ki", world.rotations[i], step),
+            step[:, 0] * turn[:, 0] + step[:, 1] * turn[:, 1] + step[:, 2] * turn[:, 2],
             # conj(a) b
             aw * bx - ax * bw - ay * bz + az * by,
             aw * by + ax * bz - ay * bw - az * bx,
@@ -221,15 +240,18 @@ def relative_poses(world: World, pairs: IntArray) -> FloatArray:
     )
 
 
-def polygon_distances(world: World, pairs: IntArray, penetration: bool) -> DistanceRows:
+def polygon_distances(
+    world: World, pairs: IntArray, penetration: bool, tier: str, counts: Counter[str]
+) -> DistanceRows:
     """Distances of polygons, in any order."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
-    gap, lower, upper, point_a, point_b, normal, status, *_ = _core.distance_polygons(*rings, penetration)
+    gap, lower, upper, point_a, point_b, normal, status, *_, rungs = _core.distance_polygons(*rings, penetration, tier)
+    count_rungs(tier, rungs, counts)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     lower, upper = _widened(lower, upper, uncertainty, penetration)
     return DistanceRows(
         pairs,
-        gap,
+        lower if tier == "bound" else gap,
         lower,
         upper,
         _in_space(point_a),
@@ -256,7 +278,7 @@ def _widened(lower: FloatArray, upper: FloatArray, by: FloatArray, signed: bool)
 
 
 def first_contact_rows(
-    world: World, pairs: IntArray, horizon: float, counts: Counter[str]
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     planar = world.planar[pairs[:, 0]]
@@ -267,46 +289,58 @@ def first_contact_rows(
         count_kinds(world, pairs[planar], counts)
     rows, unsupported = [ContactRows.silent(_NO_PAIRS)], [Unsupported.none()]
     if len(sliding):
-        rows.append(_sliding_polygons(world, sliding, horizon, counts))
+        rows.append(_sliding_polygons(world, sliding, horizon, tier, counts))
     if len(spinning):
-        answered, missing = _spinning_polygons(world, spinning)
+        answered, missing = _spinning_polygons(world, spinning, tier, counts)
         rows.append(answered)
         unsupported.append(missing)
     if len(solids):
-        answered, missing = _solid_contacts(world, solids, horizon, counts)
+        answered, missing = _solid_contacts(world, solids, horizon, tier, counts)
         rows.append(answered)
         unsupported.append(missing)
     return ContactRows.joined(rows), Unsupported.joined(unsupported)
 
 
-def _sliding_polygons(world: World, pairs: IntArray, horizon: float, counts: Counter[str]) -> ContactRows:
+def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]) -> ContactRows:
     """Polygons in translation."""
-    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     # A velocity that is off displaces by no more than this until the end of the time looked at.
     drift = world.velocity_uncertainty[pairs].sum(axis=1)
     uncertainty += np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)
-    if not uncertainty.any():
+    # What follows relies on normals as good as SPEED_ROUNDING says.
+    vague = uncertainty.any()
+    rows = polygon_contacts(
+        world, pairs, world.twists[:, :2], horizon, "float64" if vague and tier == "float32" else tier, counts
+    )
+    if not vague:
         return rows.take(rows.status != ContactStatus.NEVER)
     never = rows.status == ContactStatus.NEVER
     hits = np.flatnonzero(~never & (uncertainty > 0.0))
     counts["uncertain"] += len(hits)
-    speed, normal = _relative_velocity(world, pairs[hits]), rows.normal[hits, :2]
-    rows.lower[hits] = _earlier(rows.lower[hits], uncertainty[hits], speed, normal)
-    rows.upper[hits] = _later(world, rows.take(hits), uncertainty[hits], horizon)
+    if tier == "bound":
+        # Larger volumes meet earlier; smaller bodies may miss each other.
+        start = _approach(world, pairs[hits], uncertainty[hits], horizon, tier, counts)
+        rows.lower[hits], rows.upper[hits] = np.fmin(rows.lower[hits], start), np.inf
+    else:
+        speed, normal = _relative_velocity(world, pairs[hits]), rows.normal[hits, :2]
+        rows.lower[hits] = _earlier(rows.lower[hits], uncertainty[hits], speed, normal)
+        rows.upper[hits] = _later(world, rows.take(hits), uncertainty[hits], horizon)
     close = np.flatnonzero(never & (uncertainty > 0.0))
-    start = _approach(world, pairs[close], uncertainty[close], horizon, counts)
+    start = _approach(world, pairs[close], uncertainty[close], horizon, tier, counts)
     rows.lower[close], rows.upper[close] = start, np.where(np.isnan(start), np.nan, np.inf)
     return rows.take(~never | ~np.isnan(rows.lower))
 
 
-def polygon_contacts(world: World, pairs: IntArray, velocities: FloatArray, horizon: float) -> ContactRows:
+def polygon_contacts(
+    world: World, pairs: IntArray, velocities: FloatArray, horizon: float, tier: str, counts: Counter[str]
+) -> ContactRows:
     """The engine's answer for polygons with the given velocities."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
     velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k]]) for k in range(2))
-    status, time, lower, upper, last, normal, points, offsets, *_ = _core.first_contact_polygons(
-        *rings, velocity_a, velocity_b, horizon, True
+    status, time, lower, upper, last, normal, points, offsets, *_, rungs = _core.first_contact_polygons(
+        *rings, velocity_a, velocity_b, horizon, True, tier
     )
+    count_rungs(tier, rungs, counts)
     sets = np.empty(len(pairs), dtype=object)
     space = _in_space(points)
     for k in np.flatnonzero(np.diff(offsets)).tolist():
@@ -327,10 +361,17 @@ def _closing_speed(velocity: FloatArray, normal: FloatArray, sign: float) -> Flo
     return closing + sign * slack
 
 
+def _speed(velocity: FloatArray) -> FloatArray:
+    """Length of velocities, rounded up."""
+    speed: FloatArray = np.hypot(velocity[:, 0], velocity[:, 1]) * (1.0 + SPEED_ROUNDING)
+    return speed
+
+
 def _earlier(time: FloatArray, by: FloatArray, velocity: FloatArray, normal: FloatArray) -> FloatArray:
     """Earliest possible contact of bodies larger by `by` in all: they meet no sooner than their contact lines."""
     closing = _closing_speed(velocity, normal, -1.0)
-    lead = np.divide(by, closing, out=np.full_like(by, np.inf), where=closing > 0.0)
+    with np.errstate(over="ignore"):  # so slow that it is infinite
+        lead = np.divide(by, closing, out=np.full_like(by, np.inf), where=closing > 0.0)
     return np.maximum(np.nextafter(time - lead * (1.0 + TIME_ROUNDING), -np.inf), 0.0)
 
 
@@ -349,6 +390,8 @@ def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> F
      -depth +..............`......+
     """
     end = np.minimum(rows.last_time, horizon)
+    # A time beyond the doubles is looked at where it can be: at the start, where they are apart.
+    rows = replace(rows, time=np.where(np.isinf(rows.time), 0.0, rows.time))
     middle = np.where((rows.status == ContactStatus.OVERLAPPING) | np.isinf(end), rows.time, 0.5 * (rows.time + end))
     depth = -_distance_at(world, rows.pairs, middle, True)[2]
     deep = depth >= by
@@ -359,24 +402,27 @@ def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> F
 
 
 def _distance_at(
-    world: World, pairs: IntArray, time: FloatArray, signed: bool
+    world: World, pairs: IntArray, time: FloatArray, signed: bool, tier: str = "float64"
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Distance of translating polygons at the given times: value, lower, upper, normal (k, 2)."""
     ring_a, offsets_a = gather(*world.rings, pairs[:, 0])
     ring_b, offsets_b = gather(*world.rings, pairs[:, 1])
     moved = ring_a + np.repeat(_relative_velocity(world, pairs) * time[:, None], np.diff(offsets_a), axis=0)
-    answer = _core.distance_polygons(moved, offsets_a, ring_b, offsets_b, signed)
+    answer = _core.distance_polygons(moved, offsets_a, ring_b, offsets_b, signed, tier)
     size = np.maximum.reduceat(np.maximum(np.abs(ring_a), np.abs(moved)).max(axis=1), offsets_a[:-1])
     lower, upper = _widened(answer[1], answer[2], SHIFT_ROUNDING * size, signed)
     return answer[0], lower, upper, answer[5]
 
 
-def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, counts: Counter[str]) -> FloatArray:
+def _approach(
+    world: World, pairs: IntArray, by: FloatArray, horizon: float, tier: str, counts: Counter[str]
+) -> FloatArray:
     """(k,) time until which polygons in translation are surely more than `by` apart; NaN if to the end.
 
     Conservative advancement: the line through b's nearest point, perpendicular to the shortest way, is
-    reached no sooner than gap / closing speed from now.
+    reached no sooner than gap / closing speed from now.  Bounding volumes name no line: there all speed counts.
     """
+    volumes = tier == "bound"
     time = np.zeros(len(pairs))
     open_rows = np.arange(len(pairs))
     for _ in range(MAX_APPROACH_STEPS):
@@ -384,9 +430,10 @@ def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, cou
             break
         counts["approach steps"] += len(open_rows)
         here = pairs[open_rows]
-        _, lower, _, normal = _distance_at(world, here, time[open_rows], False)
+        _, lower, _, normal = _distance_at(world, here, time[open_rows], False, "bound" if volumes else "float64")
         gap = lower - by[open_rows]
-        closing = _closing_speed(_relative_velocity(world, here), normal, 1.0)
+        speed = _relative_velocity(world, here)
+        closing = _speed(speed) if volumes else _closing_speed(speed, normal, 1.0)
         step = np.divide(gap, closing, out=np.full_like(gap, np.inf), where=closing > 0.0)
         reached = gap <= 0.0
         time[open_rows] += np.where(reached, 0.0, step * (1.0 - TIME_ROUNDING))
@@ -395,13 +442,16 @@ def _approach(world: World, pairs: IntArray, by: FloatArray, horizon: float, cou
     return np.where(np.isfinite(time), time, np.nan)
 
 
-def _spinning_polygons(world: World, pairs: IntArray) -> tuple[ContactRows, Unsupported]:
+def _spinning_polygons(
+    world: World, pairs: IntArray, tier: str, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
     """Polygons that turn: in contact now, or unsupported."""
-    rows = polygon_contacts(world, pairs, np.zeros((len(world), 2)), 0.0)
+    rows = polygon_contacts(world, pairs, np.zeros((len(world), 2)), 0.0, tier, counts)
     apart = rows.status == ContactStatus.NEVER
     rows.status[apart] = ContactStatus.UNSUPPORTED
     rows.last_time[:] = np.nan
     certain = -_distance_at(world, pairs, np.zeros(len(pairs)), True)[2] >= world.uncertainty[pairs].sum(axis=1)
+    certain &= tier != "bound"
     rows.upper[~apart & ~certain] = np.inf
     return rows, _unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
 
@@ -416,17 +466,18 @@ def _unpredictable(world: World, pairs: Unsupported) -> Unsupported:
 
 
 def _solid_contacts(
-    world: World, pairs: IntArray, horizon: float, counts: Counter[str]
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """Solids: in contact now, at rest relative to each other and so never, or unsupported."""
-    rows, missing = distance_rows(world, pairs, True, counts)
+    rows, missing = distance_rows(world, pairs, True, tier, counts)
     motion = world.twists[rows.pairs]
     resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[rows.pairs].any(axis=1)
     resting &= ~world.velocity_uncertainty[rows.pairs].any(axis=1)
     resting |= horizon == 0.0
     touching, may_touch = rows.distance <= 0.0, rows.lower <= 0.0
+    by_volumes = np.full(len(touching), tier == "bound")  # which tell neither how deep, nor where
     status = np.select(
-        [rows.distance < 0.0, touching, ~resting, rows.status == DistanceStatus.NOT_CONVERGED],
+        [(rows.distance < 0.0) & ~by_volumes, touching, ~resting, rows.status == DistanceStatus.NOT_CONVERGED],
         [
             ContactStatus.OVERLAPPING,
             ContactStatus.TOUCHING,
@@ -438,7 +489,7 @@ def _solid_contacts(
     now = np.where(touching, 0.0, np.nan)
     known = touching | (resting & may_touch)
     points = np.empty(len(status), dtype=object)
-    for k in np.flatnonzero(touching).tolist():
+    for k in np.flatnonzero(touching & ~by_volumes).tolist():
         points[k] = rows.point_a[k : k + 1]  # the deepest point of a in b belongs to both
     answered = ContactRows(
         rows.pairs,
@@ -447,7 +498,7 @@ def _solid_contacts(
         np.where(known, 0.0, np.nan),
         np.where(known, np.where(rows.upper <= 0.0, 0.0, np.inf), np.nan),
         np.where(touching & resting, horizon, np.nan),
-        np.where(touching[:, None], rows.normal, np.nan),
+        np.where((touching & ~by_volumes)[:, None], rows.normal, np.nan),
         points,
     )
     moving = status == ContactStatus.UNSUPPORTED

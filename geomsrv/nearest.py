@@ -29,9 +29,12 @@ BEYOND = 1.0 + 2.0**-40
 
 
 def nearest_rows(
-    world: World, penetration: bool, selection: Selection | None, counts: Counter[str]
+    world: World, penetration: bool, selection: Selection | None, tier: str, counts: Counter[str]
 ) -> tuple[DistanceRows, Unsupported]:
-    """The nearest pair, at most one row, and the pairs without a kernel that may be nearer."""
+    """The nearest pair, at most one row, and the pairs without a kernel that may be nearer.
+
+    At tier "bound" that with the smallest lower end among those whose boxes are as near: none is nearer than that.
+    """
     boxes = boxes_now(world)
     size = _size(boxes)
     margin, next_margin = 0.0, size / max(len(world), 1)
@@ -40,7 +43,7 @@ def nearest_rows(
     while True:
         near = [candidates(world, family, boxes, margin, selection) for family in world.families]
         pairs = np.concatenate([part.pairs for part in near])
-        best, unsupported = _best_of(world, boxes, pairs, penetration, counts)
+        best, unsupported = _best_of(world, boxes, pairs, penetration, tier, counts)
         if len(best.pairs):
             if best.distance[0] <= margin:
                 break
@@ -74,7 +77,7 @@ def _any_kernel(world: World) -> bool:
 
 
 def _best_of(
-    world: World, boxes: Aabbs, pairs: IntArray, penetration: bool, counts: Counter[str]
+    world: World, boxes: Aabbs, pairs: IntArray, penetration: bool, tier: str, counts: Counter[str]
 ) -> tuple[DistanceRows, Unsupported]:
     """Nearest of the listed pairs; of equal ones the first by id."""
     apart = gaps(boxes, pairs)
@@ -85,7 +88,7 @@ def _best_of(
         end = min(start + helping, int(np.searchsorted(apart[order], _limit(best), side="right")))
         if end <= start:
             break
-        rows, missing = distance_rows(world, pairs[np.sort(order[start:end])], penetration, counts)
+        rows, missing = distance_rows(world, pairs[np.sort(order[start:end])], penetration, tier, counts)
         rows = DistanceRows.joined([best, rows])
         best = rows.take(np.flatnonzero(rows.distance == rows.distance.min(initial=np.inf))[:1])
         unsupported = Unsupported.joined([unsupported, missing])

@@ -29,6 +29,7 @@ from geomsrv.narrow_phase import (
     solid_distances,
 )
 from geomsrv.placement import laid_flat
+from geomsrv.queries import RUNGS, TIERS
 from geomsrv.shapes import Frustum, Shape
 from geomsrv.turning_pairs import contact_rows
 from geomsrv.world import ShapeTable, World
@@ -172,13 +173,13 @@ def distance_of_two(
     """Distance of two solids with checked poses (2, 7) that are in no scene; None if they have to go the long way.
 
     The same as `listed_distances` of `world_of`, without what only longer lists need: the one pair of a small request
-    is answered in the time that the rest of the call takes anyway.
+    is answered in the time that the rest of the call takes anyway.  `accuracy` is one of `TIERS`.
     """
     start = time.perf_counter_ns()
     model = _resting((a, b))
     if model.planar.any():
         return None
-    distance, lower, upper, point_a, point_b, normal, status = _core.distance_placed(
+    distance, lower, upper, point_a, point_b, normal, status, rung = _core.distance_placed(
         *model.table.packed,
         model.table.reach,
         model.shape,
@@ -187,11 +188,16 @@ def distance_of_two(
         _ONE_PAIR,
         RELATIVE_POSE_ROUNDING,
         penetration,
+        accuracy,
+        model.table.frusta,
     )
     if status[0] == DistanceStatus.UNSUPPORTED:
         return None
     names = (a.kind, b.kind) if a.kind < b.kind else (b.kind, a.kind)
-    cost = Cost(time.perf_counter_ns() - start, accuracy, {"narrow {}-{}".format(*names): 1})
+    counts = {"narrow {}-{}".format(*names): 1}
+    if accuracy != "float64":
+        counts[RUNGS[rung[0]]] = 1
+    cost = Cost(time.perf_counter_ns() - start, accuracy, counts)
     return ListedDistances(status, distance, lower, upper, point_a, point_b, normal, "", cost)
 
 
@@ -215,18 +221,18 @@ def listed_distances(
 ) -> ListedDistances:
     """Distances of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS)
     penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
     _distinct(world, pairs)
     _count(world, pairs, counts)
     # Most lists are all of one kind, and then no row needs to be moved.
     planar = world.planar[pairs] if world.planar.any() else _NONE
     if not planar.any():
-        columns = placed_distances(world, pairs, penetration)
+        columns = placed_distances(world, pairs, penetration, tier, counts)
     elif planar.all():
-        columns = _columns(polygon_distances(world, pairs, penetration))
+        columns = _columns(polygon_distances(world, pairs, penetration, tier, counts))
     else:
-        columns = _columns(_mixed_distances(world, pairs, planar, penetration))
+        columns = _columns(_mixed_distances(world, pairs, planar, penetration, tier, counts))
     distance, lower, upper, point_a, point_b, normal, status = columns
     unsupported = status == DistanceStatus.UNSUPPORTED
     return ListedDistances(
@@ -247,7 +253,9 @@ def _columns(rows: DistanceRows) -> tuple[Any, ...]:
     return rows.distance, rows.lower, rows.upper, rows.point_a, rows.point_b, rows.normal, rows.status
 
 
-def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetration: bool) -> DistanceRows:
+def _mixed_distances(
+    world: World, pairs: IntArray, planar: BoolArray, penetration: bool, tier: str, counts: Counter[str]
+) -> DistanceRows:
     """Solids with solids, polygons with polygons, and nothing for the rest."""
     count = len(pairs)
     number, vector = np.full(count, np.nan), np.full((count, 3), np.nan)
@@ -256,7 +264,7 @@ def _mixed_distances(world: World, pairs: IntArray, planar: BoolArray, penetrati
         pairs, number, number.copy(), number.copy(), vector, vector.copy(), vector.copy(), status, np.zeros(count)
     )
     for chosen, kernel in ((~planar.any(axis=1), solid_distances), (planar.all(axis=1), polygon_distances)):
-        part = kernel(world, pairs[chosen], penetration)
+        part = kernel(world, pairs[chosen], penetration, tier, counts)
         for column in fields(DistanceRows)[1:]:
             getattr(whole, column.name)[chosen] = getattr(part, column.name)
     return whole
@@ -297,12 +305,12 @@ def listed_first_contacts(
 ) -> ListedContacts:
     """First contacts within `horizon` [s] of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    tier = _validate.accuracy(accuracy)
+    tier = _validate.accuracy(accuracy, TIERS)
     end = _validate.limit(horizon, "horizon")
     if _all_slide(world, pairs):
         return _sliding_polygons(world, pairs, end, tier, start)
     listed = _Listed(world, pairs)
-    rows, unsupported = contact_rows(world, listed.comparable, end, counts)
+    rows, unsupported = contact_rows(world, listed.comparable, end, tier, counts)
     at = listed.rows_among(rows.pairs)
     # A pair without a row never touches, or could not be compared at all.
     status = _take(rows.status, at, ContactStatus.NEVER)
@@ -342,7 +350,7 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
     _distinct(world, pairs)
     counts = Counter[str]()
     _count(world, pairs, counts)
-    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon)
+    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon, tier, counts)
     none = np.zeros((0, 3))
     sets = [none if points is None else points for points in rows.points]
     return ListedContacts(

@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from geomsrv import _validate
 from geomsrv.answers import Cull, Distances, FirstContacts, IntArray, json_line
 from geomsrv.certificates import without_claim
 from geomsrv.narrow_phase import relative_poses
@@ -24,6 +25,7 @@ __all__ = ["contact_certificates", "cull_certificates", "distance_certificates"]
 
 def cull_certificates(world: World, rows: IntArray, frustum: Frustum, *, accuracy: str) -> Iterator[str]:
     """A line of JSON for each of the listed objects; what is no box, or may be elsewhere, claims nothing."""
+    _validate.certificates(True, accuracy)
     known = world.table.boxes[world.shape[rows]] & (world.uncertainty[rows] == 0.0)
     own = rows[known]
     boxes = Boxes(world.poses[own, :3], world.rotations[own].swapaxes(1, 2), world.table.half[world.shape[own]])
@@ -35,6 +37,7 @@ def cull_certificates(world: World, rows: IntArray, frustum: Frustum, *, accurac
 
 def distance_certificates(world: World, pairs: IntArray, *, want: Sequence[str], accuracy: str) -> Iterator[str]:
     """A line of JSON for each pair: b at its pose in the frame of a, or polygons in the plane, either rounded."""
+    _validate.certificates(True, accuracy)
     ask = partial(distance, want=tuple(want), accuracy=accuracy, certificates=True)
     for (i, j), pose in zip(pairs.tolist(), relative_poses(world, pairs), strict=True):
         if world.planar[i] != world.planar[j]:
@@ -47,6 +50,7 @@ def distance_certificates(world: World, pairs: IntArray, *, want: Sequence[str],
 
 def contact_certificates(world: World, pairs: IntArray, horizon: float, *, accuracy: str) -> Iterator[str]:
     """A line of JSON for each pair; what is not two polygons in translation, exactly known, claims nothing."""
+    _validate.certificates(True, accuracy)
     vague = ~world.planar | (world.uncertainty > 0.0) | (world.velocity_uncertainty > 0.0)
     vague |= world.turns & (horizon > 0.0)
     for i, j in pairs.tolist():

@@ -53,7 +53,6 @@ CULL_COUNTS = {
 # What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
-SHAPE_TIERS = ("bound", "float64", "exact")  #: of queries about pairs of shapes
 
 
 def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
@@ -103,10 +102,17 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
-    state, certain, counts, *evidence = _core.cull(*given, tier, certified)
+    state, certain, counts = _core.cull(*given, tier, False)[:3]
+
+    def evidence(i: int) -> tuple[Any, Any]:
+        packed, center, axes, half_extents = given
+        row = slice(i, i + 1)
+        alone: Any = _core.cull(packed, center[row], axes[row], half_extents[row], tier, True)
+        return alone[3][0], alone[4][0]
+
     stages = {name: n for name, n in zip(CULL_STAGES, counts, strict=True) if name in CULL_COUNTS[tier]}
     cost = Cost(time.perf_counter_ns() - start, tier, stages)
-    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, *evidence) if certified else None)
+    return Cull(state, certain, cost, _record=certify_cull(frustum, boxes, evidence) if certified else None)
 
 
 def distance_to_frustum(
@@ -169,10 +175,14 @@ def distance_to_frustum(
     certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
     given = frustum.packed(), array, tier
-    gap, lower, upper, region, point_a, simplex, rungs = kernel(*given, "witness" in effects, certified)
+    gap, lower, upper, region, point_a, _, rungs = kernel(*given, "witness" in effects, False)
 
     def nearest() -> FloatArray:
         return np.full_like(array, np.nan) if tier == "bound" else cast(FloatArray, kernel(*given, True, False)[4])
+
+    def simplex(i: int) -> Any:
+        alone: Any = kernel(given[0], array[i : i + 1], tier, False, True)
+        return alone[5][0]
 
     return Distances(
         distance=gap,
@@ -217,7 +227,8 @@ def first_contact(
         Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
         rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
         circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
-        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
+        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.  "float32" takes them
+        literally, too: NEVER and OVERLAPPING are certain; TOUCHING is all that it cannot tell from touching.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -289,7 +300,7 @@ def first_contact(
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
     end = _validate.limit(t_max, "t_max")
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
     if isinstance(a, Polytopes):
@@ -333,7 +344,7 @@ def distance(
     poses_ab : (n, 7) or (7,) float, optional
         Poses of b in a: x y z [m], qx qy qz qw.
     accuracy : str
-        Tier; see the numerics page.
+        Tier; see the numerics page.  "bound" is a lower bound, without nearest points.
     want : tuple of str
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
     certificates : bool
@@ -368,7 +379,7 @@ def distance(
         found = _polygon_distance(a, b, signed, accuracy, start)[0]
         proven = _validate.certificates(certificates, found.cost.accuracy)
         return replace(found, _record=certify_distances(a, b, signed=signed)) if proven else found
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     if poses_ab is None:
         answer, message = _batch_distance(a, b, signed, tier, certified), ""
@@ -467,7 +478,7 @@ def _polygon_distance(
     a: Polygons, b: Any, penetration: bool, accuracy: str, start: int
 ) -> tuple[Distances, NDArray[np.bool_], NDArray[np.bool_]]:
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
-    tier = _validate.accuracy(accuracy, SHAPE_TIERS)
+    tier = _validate.accuracy(accuracy, TIERS)
     _expect(b, Polygons, "b")
     _common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(

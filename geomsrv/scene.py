@@ -27,6 +27,7 @@ from geomsrv.errors import GeometryError, SceneError
 from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
+from geomsrv.queries import TIERS
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
 from geomsrv.turning_pairs import contact_rows
@@ -147,7 +148,8 @@ class PairDistances(_PairRows):
     ids_a, ids_b : list of str
     distance, lower, upper : (n,) float64
         Distance [m] and a proven interval around the exact value, widened by the objects' uncertainty.  0 for
-        touching and overlapping bodies, or minus the penetration depth if ``want`` named "penetration".
+        touching and overlapping bodies, or minus the penetration depth if ``want`` named "penetration".  At
+        tier "bound" `distance` is `lower`.
     point_a, point_b : (n, 3) float64
         Nearest points, or the deepest ones, fixed frame.
     normal : (n, 3) float64
@@ -157,7 +159,8 @@ class PairDistances(_PairRows):
     unsupported : list of (str, str, str)
         Id, id and reason of each pair near enough to matter that no kernel answers.
     cost : Cost
-        ``counts``: objects, pairs, allowed, candidates, "narrow <kind>-<kind>" calls, unsupported.
+        ``counts``: objects, pairs, allowed, candidates, "narrow <kind>-<kind>" calls, unsupported; at other tiers than
+        "float64" also how many pairs were answered by "bound", "filter", "wide", "exact".
     version : int
     stamp : object
     message : str
@@ -226,6 +229,8 @@ class SceneCull:
     message : str
         Names the kinds that could only be judged by their bounding box; empty otherwise.
     cost : Cost
+        ``counts``: objects, "boxes" around them, "shapes" that were looked at themselves, and verdicts by stage: of
+        boxes as for `cull`, and, at other tiers than "float64", of shapes.
     version : int
     stamp : object
     """
@@ -248,6 +253,13 @@ class Scene:
     """Named shapes that move, and queries over all pairs of them that matter.
 
     Safe to use from several threads: every answer is about one version.
+
+    A tier means what it means to the query functions, about literal numbers.  Of solids these are the shapes and
+    the pose of b in a, which is computed once, in float64, from the poses of both; of polygons the rings, which
+    are placed in the plane once, in float64; of what a camera sees the pose, as a rotation matrix computed once.
+    So at tier "exact" a distance, a time or a state is the correctly rounded one for these numbers, while
+    ``lower`` and ``upper`` also cover what rounding the pose of b in a may have changed, and the objects'
+    uncertainty.  Points and normals of solids are turned into the fixed frame in float64.
 
     Parameters
     ----------
@@ -467,7 +479,7 @@ class Scene:
         want : sequence of str
             "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
         accuracy : str
-            Tier; see the numerics page.
+            Tier; see the class and the numerics page.  "bound" lists every pair whose bounding volumes are that near.
 
         Returns
         -------
@@ -500,15 +512,16 @@ class Scene:
         """The pair with the smallest distance, one row; no row if no pair is supported.
 
         Of equally near pairs the first by (id_a, id_b); with "penetration" in `want` the deepest.
-        `unsupported` lists those that may be nearer.  Arguments as for `distances`.
+        `unsupported` lists those that may be nearer.  At tier "bound" no pair is nearer than the answer's ``distance``.
+        Arguments as for `distances`.
         """
         start = time.perf_counter_ns()
-        tier = _validate.accuracy(accuracy)
+        tier = _validate.accuracy(accuracy, TIERS)
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
-        rows, unsupported = nearest_rows(world, penetration, selection, counts)
+        rows, unsupported = nearest_rows(world, penetration, selection, tier, counts)
         return _pair_distances(world, rows, unsupported, start, tier, counts)
 
     def first_contacts(
@@ -523,7 +536,8 @@ class Scene:
 
         Polygons in pure translation are followed, and polygons, boxes, hulls, spheres and capsules where one of a pair
         turns, about the origin of its pose; pairs at rest relative to each other touch now or never; any pair that is
-        in contact now answers time 0.  Other motions answer UNSUPPORTED by name.
+        in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier "bound" a row means that the
+        pair may touch, TOUCHING that it may already; objects that turn are followed at "float64" only.
 
         Parameters
         ----------
@@ -543,12 +557,12 @@ class Scene:
         """
         start = time.perf_counter_ns()
         limit = _validate.limit(horizon, "horizon")
-        tier = _validate.accuracy(accuracy)
+        tier = _validate.accuracy(accuracy, TIERS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_swept(world, limit), 0.0, selection, counts)
-        rows, unsupported = contact_rows(world, pairs, limit, counts)
+        rows, unsupported = contact_rows(world, pairs, limit, tier, counts)
         counts["unsupported"] += len(unsupported.pairs)
         sets = [points for points in rows.points if points is not None]
         sizes = [0 if points is None else len(points) for points in rows.points]
@@ -574,7 +588,9 @@ class Scene:
         """What a camera frustum sees of every object.
 
         Boxes, spheres, capsules, hulls, half spaces and polygons are judged themselves, other kinds by their
-        bounding box: MAY_INTERSECT where that is not enough.
+        bounding box: MAY_INTERSECT where that is not enough.  Tier "bound" looks at bounding volumes only, and answers
+        INTERSECTS where they leave it open; "exact" leaves doubt only about spheres and capsules that touch within the
+        rounding of a distance, about half spaces, and where an object may be elsewhere.
 
         Parameters
         ----------
@@ -590,13 +606,13 @@ class Scene:
         SceneCull
         """
         start = time.perf_counter_ns()
-        tier = _validate.accuracy(accuracy)
+        tier = _validate.accuracy(accuracy, TIERS)
         if not isinstance(frustum, Frustum):
             raise GeometryError(f"frustum must be Frustum, got {type(frustum).__name__}")
         world = self.world
         rows = np.arange(len(world)) if ids is None else np.flatnonzero(_members(world, ids, "ids"))
         counts: Counter[str] = Counter(objects=len(rows))
-        state, certain, boxed = sight(world, rows, frustum, counts)
+        state, certain, boxed = sight(world, rows, frustum, tier, counts)
         message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
         return SceneCull(
             [world.ids[k] for k in rows.tolist()],
@@ -719,13 +735,13 @@ class Scene:
         want: Sequence[str],
         accuracy: str,
     ) -> PairDistances:
-        tier = _validate.accuracy(accuracy)
+        tier = _validate.accuracy(accuracy, TIERS)
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_now(world), limit, selection, counts)
-        rows, unsupported = distance_rows(world, pairs, penetration, counts)
+        rows, unsupported = distance_rows(world, pairs, penetration, tier, counts)
         open_ended = (rows.uncertainty > 0.0) | (rows.status == DistanceStatus.NOT_CONVERGED)
         rows = rows.take((rows.distance <= limit) | (open_ended & (rows.lower <= limit)))
         return _pair_distances(world, rows, unsupported, start, tier, counts)

@@ -30,16 +30,16 @@ FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, besi
 
 
 def contact_rows(
-    world: World, pairs: IntArray, horizon: float, counts: Counter[str]
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     followed = world.turns[pairs].any(axis=1) & followed_in_turning(world)[pairs].all(axis=1) & (horizon > 0.0)
-    if not followed.any():
-        return first_contact_rows(world, pairs, horizon, counts)
+    if tier != "float64" or not followed.any():
+        return first_contact_rows(world, pairs, horizon, tier, counts)
     turning = pairs[followed]
     count_kinds(world, turning, counts)
     counts["rotation"] += len(turning)
-    rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, counts)
+    rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, tier, counts)
     return ContactRows.joined([_turning_contacts(world, turning, horizon), rows]), unsupported
 
 

@@ -32,7 +32,7 @@ from geomsrv.shapes import (
     pack,
 )
 
-__all__ = ["ROUNDOFF", "UNDERFLOW", "ShapeRow", "ShapeTable", "World", "gather", "supported_kinds"]
+__all__ = ["ROUNDOFF", "UNDERFLOW", "ShapeRow", "ShapeTable", "World", "gather", "own_numbers", "supported_kinds"]
 
 AnyShape = Shape | Frustum
 
@@ -71,6 +71,8 @@ class ShapeTable:
         What the arrays below were made of.
     packed : PackedShapes
         As the engine reads them.
+    frusta : (m, 18) float64 or None
+        View frusta by their own numbers, and 0 for every other shape; None if there is none.
     kind_names, kind : tuple of str, (m,) int64
         Kinds that occur, sorted, and which of them each shape is.
     planar, unbounded, boxes : (m,) bool
@@ -87,6 +89,7 @@ class ShapeTable:
     shapes: tuple[AnyShape, ...]
     rows: tuple[ShapeRow, ...]
     packed: PackedShapes
+    frusta: FloatArray | None
     kind_names: tuple[str, ...]
     kind: IntArray
     planar: BoolArray
@@ -120,6 +123,7 @@ class ShapeTable:
                 hulls,
                 hull_offsets,
             ),
+            frusta=own_numbers(listed),
             kind_names=tuple(names),
             kind=kind,
             planar=kind == codes.get(Polygon.kind, -1),
@@ -132,6 +136,13 @@ class ShapeTable:
             ring_vertices=rings,
             ring_offsets=ring_offsets,
         )
+
+
+def own_numbers(shapes: Sequence[AnyShape]) -> FloatArray | None:
+    """(m, 18) view frusta, of which a packed table has the rounded corners, and 0 for others; None if there is none."""
+    if not any(isinstance(shape, Frustum) for shape in shapes):
+        return None
+    return np.array([shape.packed() if isinstance(shape, Frustum) else np.zeros(18) for shape in shapes])
 
 
 def _end_to_end(items: list[FloatArray], width: int) -> tuple[FloatArray, IntArray]:

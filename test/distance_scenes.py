@@ -63,7 +63,7 @@ def matrix_of(pose: np.ndarray) -> np.ndarray:
 # ----------------------------------------------------------------------------------------------- exact answers
 
 
-def core(shape: gs.Shape) -> tuple[list[list[float]], float]:
+def core(shape: Any) -> tuple[list[list[float]], float]:
     """Vertices and rounding radius."""
     if isinstance(shape, gs.Sphere):
         return [[0.0, 0.0, 0.0]], shape.radius
@@ -72,6 +72,10 @@ def core(shape: gs.Shape) -> tuple[list[list[float]], float]:
     if isinstance(shape, gs.Box):
         x, y, z = shape.half_extents.tolist()
         return [[i * x, j * y, k * z] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], 0.0
+    if isinstance(shape, gs.Frustum):
+        return polytope.frustum_corners(  # type: ignore[return-value]
+            shape.origin.tolist(), shape.axes.tolist(), shape.bounds, shape.near, shape.far
+        ), 0.0
     return shape.vertices.tolist(), 0.0
 
 

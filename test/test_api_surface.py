@@ -252,9 +252,10 @@ def test_stub_agrees_with_the_engine() -> None:
 
 
 def array_arguments(signature: str) -> list[np.ndarray]:
-    """An array of the dtype and number of axes that each array parameter asks for."""
-    found = re.findall(r"ndarray\[dtype=(\w+), shape=\(([^)]*)\)", signature)
-    shapes = [[4 if size == "*" else int(size) for size in shape.replace(" ", "").split(",")] for _, shape in found]
+    """An array of the dtype and number of axes that each array parameter asks for; where it takes any, a matrix."""
+    found = re.findall(r"ndarray\[dtype=(\w+)(?:, shape=\(([^)]*)\))?", signature)
+    sizes = [(shape or "3, 3").replace(" ", "").split(",") for _, shape in found]
+    shapes = [[4 if size == "*" else int(size) for size in shape] for shape in sizes]
     return [np.zeros(shape, dtype) for (dtype, _), shape in zip(found, shapes, strict=True)]
 
 

@@ -13,7 +13,8 @@ import pytest
 import yaml
 
 from geomsrv.config import Config, settings
-from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.errors import GeometryError
+from geomsrv.queries import TIERS
 
 YAML = Path(__file__).resolve().parents[1] / "config" / "geomsrv.yaml"
 
@@ -108,7 +109,6 @@ def test_what_depends_on_each_other() -> None:
     assert Config().changed({"camera.near": 20.0, "camera.far": 30.0}).camera_near == 20.0
 
 
-@pytest.mark.parametrize("accuracy", ["bound", "float32", "exact"])
-def test_tiers_that_are_not_there_yet(accuracy) -> None:
-    with pytest.raises(NotAvailableError, match=f"accuracy='{accuracy}' is not available yet"):
-        Config().changed({"accuracy": accuracy})
+@pytest.mark.parametrize("accuracy", TIERS)
+def test_the_tier_is_one_that_every_query_answers(accuracy) -> None:
+    assert Config().changed({"accuracy": accuracy}).accuracy == accuracy

@@ -20,7 +20,8 @@ import pytest
 import geomsrv as gs
 from geomsrv import _fcl_process, _fcl_supervisor, _judge, _validate, _witness, crosscheck, fcl_worker
 from geomsrv.answers import Cost, Distances
-from geomsrv.crosscheck import CrossCheck, Mode, SkipReason, cross_check_scene
+from geomsrv.crosscheck import COMPARED, CrossCheck, Mode, SkipReason, cross_check_scene
+from geomsrv.queries import TIERS
 
 SCALE = 20 if os.environ.get("GEOMSRV_SOAK") else 1
 NOWHERE = np.full(3, np.nan)
@@ -461,6 +462,19 @@ def test_off_starts_nothing_and_counts_nothing(rng):
         assert check.poll() == [] and check.drain(0.0)
         assert check.worker_pid is None and check._thread is None
         assert check.tally().offered == 0 and check.tally().summary() == "cross-check off"
+
+
+def test_tiers_that_claim_too_little_are_not_compared(rng):
+    scene = crowd(rng, 4)
+    ball, pose = gs.Sphere(1.0), [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
+    with CrossCheck("all") as check:
+        for tier in TIERS:
+            asked = {"want": ("penetration",), "accuracy": tier}
+            compared, near = tier in COMPARED, scene.distances(np.inf, **asked)
+            assert check.submit_scene(scene, near) == compared * len(near)
+            assert check.submit([(ball, ball)], pose, gs.distance(ball, ball, pose, **asked)) == compared
+        assert check.drain(30.0)
+        assert check.tally().unexplained == 0 and set(COMPARED) == {"float64", "exact"}
 
 
 def test_bad_arguments_are_named(rng):

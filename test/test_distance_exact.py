@@ -36,6 +36,15 @@ DEEP = ("penetration",)
 SOAK = 20 if os.environ.get("GEOMSRV_SOAK") else 1
 EXTREMES = (1.0, 1.0, 1.0, 2.0**-990, 2.0**990, 2.0**-40, 2.0**60)
 
+# A normal's length: three parts rounded by half an eps each, and four roundings of the norm computed here.
+UNIT_LENGTH = 4 * 2.0**-53
+# Heights and steps of rounded points along a normal, times their size: a point takes a product and a sum for each of
+# up to four vertices of a feature, a height three products and sums more, and the normal is off by two units.
+HEIGHT = 8 * 2.0**-53
+# Of witnesses found in doubles, whose distance is not that of the nearest points, in scenes of size 1: hundreds of
+# units in the worst case of a thin triangle, and far less than what a wrong simplex is off by.
+ROUGH_WITNESS = 1e-12
+
 
 # ------------------------------------------------------------------------------------------------- what is right
 
@@ -80,10 +89,10 @@ def check_points(answer: gs.Distances, vertices_a: Any, vertices_b: Any, text: s
     size = max(np.abs(a).max(), np.abs(b).max(), float(abs(answer.distance[0])), 5e-324)
     unit = 2.0 ** -math.frexp(size)[1] if size > 1e-300 else 2.0**1000
     reach = max(np.ptp(a * unit, axis=0).max(), np.ptp(b * unit, axis=0).max(), abs(answer.distance[0] * unit))
-    slack = 8 * 2.0**-53 * (3.0 * reach + 2.0)
+    slack = HEIGHT * (3.0 * reach + 2.0)  # three coordinates, and those of the unit, which is 1
     normal, d = answer.normal[0], answer.distance[0] * unit
     step = (answer.point_b[0] - answer.point_a[0]) * unit
-    assert abs(np.linalg.norm(normal) - 1.0) <= 2.0**-51, text
+    assert abs(np.linalg.norm(normal) - 1.0) <= UNIT_LENGTH, text
     assert np.abs(step - d * normal).max() <= slack, (step, d * normal, text)
     # Supports along the normal are exact to rounding, and the points lie in the supporting planes.
     top, bottom = (a * unit @ normal).max(), (b * unit @ normal).min()
@@ -447,7 +456,9 @@ def test_the_simplex_proves_the_answer(penetration: bool, rng: np.random.Generat
             if accuracy == "exact":
                 assert square == least, reproducer(a=vars(a), b=vars(b), pose=pose)
             else:
-                assert least <= square <= (math.sqrt(least) + 1e-12) ** 2, reproducer(a=vars(a), b=vars(b), pose=pose)
+                assert least <= square <= (math.sqrt(least) + ROUGH_WITNESS) ** 2, reproducer(
+                    a=vars(a), b=vars(b), pose=pose
+                )
         tally["meet" if least == 0 else "apart"] += 1
     assert min(tally.values()) > 10, tally
 

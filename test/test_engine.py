@@ -10,6 +10,7 @@ import pytest
 import geomsrv as gs
 from geomsrv.config import Config
 from geomsrv.engine import CONTACTS, DISTANCES, MARKERS, VISIBLE, Engine
+from geomsrv.queries import TIERS
 
 EVERYTHING = frozenset({CONTACTS, DISTANCES, VISIBLE, MARKERS})
 SQUARE = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -165,3 +166,16 @@ def test_failures_are_counted(monkeypatch) -> None:
     monkeypatch.undo()
     engine.evaluate(EVERYTHING)
     assert engine.counters["evaluations failed"] == 1 and not engine.failing
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_every_topic_is_answered_at_the_tier_of_the_configuration(tier) -> None:
+    engine = make()
+    engine.configure(Config().changed({"accuracy": tier}))
+    answer = engine.evaluate(EVERYTHING)
+    assert answer.contacts.pairs.cost.accuracy == answer.distances.cost.accuracy == tier
+    assert answer.visible.cost.accuracy == tier
+    near = set(zip(answer.distances.ids_a, answer.distances.ids_b, strict=True))
+    assert near >= {("ball", "box"), ("box", "near")}, "no tier misses a pair"
+    if tier != "bound":
+        assert answer.contacts.depth.tolist()[0] == pytest.approx(0.25)

@@ -15,6 +15,8 @@ from plain_messages import message, request, response
 import geomsrv as gs
 from geomsrv.config import Config
 from geomsrv.engine import Engine
+from geomsrv.narrow_phase import relative_poses
+from geomsrv.queries import TIERS
 from geomsrv.ros import convert
 from geomsrv.ros.handlers import Handlers
 from geomsrv.verify import verify_lines
@@ -436,6 +438,14 @@ def test_certificates_say_what_the_answer_says(desk) -> None:
     assert got.lower[0] <= float.fromhex(claim["lower"]) <= 0.5 <= float.fromhex(claim["upper"]) <= got.upper[0]
     (state,) = claims(desk.ask("Cull", ids=["box"], certificates=True))
     assert state == {"state": "INSIDE"}
+    # Turned bodies: the number is that of the same literal pose, only the interval covers the rounding of it.
+    turned = [gs.SceneObject("a", HULL_A, POSE_A), gs.SceneObject("b", HULL_B, POSE_B)]
+    desk.engine.apply(gs.SceneUpdate(add=turned))
+    for tier in ("float64", "exact"):
+        got = desk.ask("Distance", ids_a=["a"], ids_b=["b"], certificates=True, accuracy=tier)
+        (claim,) = claims(got)
+        assert float.fromhex(claim["distance"]) == got.distance[0] and claim["meets"] is False
+        assert got.lower[0] < float.fromhex(claim["lower"]) < float.fromhex(claim["upper"]) < got.upper[0]
 
 
 def test_objects_that_may_be_elsewhere_are_not_certified(desk) -> None:
@@ -619,10 +629,172 @@ def test_what_is_not_there_yet_is_named(desk, service) -> None:
     for fields, text in (
         ({"tolerance": 1e-3}, "tolerance=0.001 is not available yet"),
         ({"tolerance": math.nan}, "tolerance=nan is not available yet"),
-        ({"accuracy": "exact"}, "accuracy='exact' is not available yet"),
     ):
         got = desk.ask(service, **fields)
         assert got.status == NOT_AVAILABLE and text in got.message and is_empty(got)
+
+
+# ---------------------------------------------------------------------------------------------------------- tiers
+
+ACCURACIES = ("bound", "float32", "float64", "exact")
+POSE_A, POSE_B = gs._validate.poses([[0.5, 0, 0, 0.1, 0.2, 0.3, 0.9274], [1.5, 2, 1, 0.5, 0.5, 0.5, 0.5]])
+HULL_A, HULL_B = gs.Convex(np.eye(3)), gs.Convex([[0, 0, 0], [1, 0.3, 0], [0.2, 1, 0], [0.1, 0.2, 1]])
+TRIANGLE = gs.Polygon([[0, 0], [1, 0.3], [0.2, 1]])
+TRIANGLES = [gs.Polygons.from_list([TRIANGLE.vertices + step]) for step in ([0, 0], [3, 0.1])]
+MOVING = [obj("p", TRIANGLE, (0, 0, 0), (1, 0, 0)), obj("q", TRIANGLE, (3, 0.1, 0))]
+VIEW = gs.Frustum([0, 0, -5], np.eye(3), 1.0, 1.0, 1.0, 4.5)
+SEEN_AT = np.stack([POSE_A, POSE_B, POSE_A + (0, 0, 2, 0, 0, 0, 0)])
+SEEN = gs.Boxes.from_poses(SEEN_AT, np.full((3, 3), 0.5))
+
+
+def by_tier(desk):
+    """Requests of every service, and what the query functions say about the same numbers."""
+    inline = {"select": INLINE, "shapes_a": shapes(HULL_A), "poses_a": D(POSE_A), "want": ["penetration"]}
+    world = gs.Scene()
+    world.apply(gs.SceneUpdate(add=[gs.SceneObject("a", HULL_A, POSE_A), gs.SceneObject("b", HULL_B, POSE_B)]))
+    between = relative_poses(world.world, np.array([[0, 1]]))
+
+    def apart(tier):
+        return gs.distance(HULL_A, HULL_B, between, want=("penetration",), accuracy=tier)
+
+    def contact(tier):
+        return gs.first_contact(*TRIANGLES, (1, 0), (0, 0), t_max=5.0, accuracy=tier)
+
+    cells = [obj(f"{i}", gs.Box([0.5] * 3)) for i in range(3)]
+    desk.engine.apply(gs.SceneUpdate(clear=True))
+    desk.engine.apply(gs.SceneUpdate(add=[gs.SceneObject("a", HULL_A, POSE_A), gs.SceneObject("b", HULL_B, POSE_B)]))
+    desk.engine.apply(gs.SceneUpdate(add=[*MOVING, *cells]))
+    desk.engine.scene.set_states(["0", "1", "2"], SEEN_AT)
+    flat = {
+        "shapes_a": shapes(TRIANGLE),
+        "poses_a": at((0, 0, 0)),
+        "twists_a": D([1, 0, 0, 0, 0, 0]),
+        "shapes_b": shapes(TRIANGLE),
+        "poses_b": at((3, 0.1, 0)),
+    }
+    given, want = {"view": 1, "frustum": frustum(VIEW)}, lambda tier: gs.cull(VIEW, SEEN, accuracy=tier)
+    batch = {"kind_a": 104, "values_a": D(VIEW.packed())}
+    rings = {
+        f"{name}_{s}": value
+        for s, ring in zip("ab", TRIANGLES, strict=True)
+        for name, value in (("vertices", D(ring.vertices)), ("offsets", convert.uint32s(ring.offsets)))
+    }
+    hulls = gs.Polytopes.from_list([HULL_A.vertices])
+    solid = {f"{n}_{s}": v for s in "ab" for n, v in (("vertices", D(HULL_A.vertices)), ("offsets", [0, 3]))}
+    return [
+        ("Distance", {**inline, "shapes_b": shapes(HULL_B), "poses_b": D(POSE_B)}, apart, 1),
+        ("Distance", {**inline, "shapes_b": shapes(HULL_B, HULL_B), "poses_b": D([POSE_B] * 2)}, apart, 2),
+        ("Distance", {"select": BY_IDS, "ids_a": ["a"], "ids_b": ["b"], "want": ["penetration"]}, apart, 1),
+        ("FirstContact", {"select": BY_IDS, "ids_a": ["p"], "ids_b": ["q"], "horizon": 5.0}, contact, 1),
+        ("FirstContact", {"select": INLINE, **flat, "horizon": 5.0}, contact, 1),
+        ("Cull", {"select": BY_IDS, "ids": ["0", "1", "2"], **given}, want, 3),
+        ("Cull", {"select": INLINE, "shapes": shapes(*[gs.Box([0.5] * 3)] * 3), "poses": D(SEEN_AT), **given}, want, 3),
+        (
+            "CullBatch",
+            {
+                "frustum": D(VIEW.packed()),
+                "centers": D(SEEN.center),
+                "axes": D(SEEN.axes),
+                "half_extents": D(SEEN.half_extents),
+            },
+            want,
+            3,
+        ),
+        (
+            "DistanceBatch",
+            {**batch, "kind_b": 105, "values_b": D([[1, 2, 3]])},
+            lambda tier: gs.distance_to_frustum(VIEW, [[1.0, 2.0, 3.0]], accuracy=tier),
+            1,
+        ),
+        (
+            "DistanceBatch",
+            {**batch, "kind_b": 103, "values_b": D(HULL_A.vertices), "offsets_b": [0, 3]},
+            lambda tier: gs.distance(VIEW, hulls, accuracy=tier),
+            1,
+        ),
+        ("FirstContactBatch", {**rings, "dimension": 2, **still(2), "t_max": 5.0}, contact, 1),
+        (
+            "FirstContactBatch",
+            {**solid, "dimension": 3, **still(3)},
+            lambda tier: gs.first_contact(hulls, hulls, (1, 0, 0), (0, 0, 0), t_max=2.0, accuracy=tier),
+            1,
+        ),
+    ]
+
+
+def still(dimension):
+    return {"velocities_a": D([1.0, 0.0, 0.0][:dimension]), "velocities_b": D([0.0] * dimension)}
+
+
+@pytest.mark.parametrize("tier", ACCURACIES)
+def test_services_answer_at_every_tier_that_the_query_answers(desk, tier) -> None:
+    for service, fields, ask, count in by_tier(desk):
+        got = desk.ask(service, **fields, accuracy=tier)
+        try:
+            want = ask(tier)
+        except gs.NotAvailableError as refusal:
+            answered = str(refusal).partition("answers ")[2]
+            assert got.status == NOT_AVAILABLE and is_empty(got), (service, got.message)
+            assert f"accuracy='{tier}' is not available yet; this query answers {answered}" == got.message
+            continue
+        assert got.status in (OK, UNSUPPORTED) and got.cost.accuracy == tier, (service, got.message)
+        if "Cull" in service:
+            assert got.states.tolist() == want.state.tolist() and got.certain.tolist() == want.certain.tolist()
+        elif "FirstContact" in service:
+            assert got.item_status.tolist() == want.status.tolist()
+            for name in ("time", "time_lower", "time_upper", "last_time"):
+                assert np.array_equal(getattr(got, name), getattr(want, name), equal_nan=True), (service, name)
+        else:
+            assert len(got.distance) == count
+            if tier == "bound" and service == "Distance":
+                assert all(low == d <= want.distance[0] for low, d in zip(got.lower, got.distance, strict=True))
+            else:
+                assert got.distance.tolist() == want.distance.tolist() * count
+            assert all(
+                low <= want.lower[0] and want.upper[0] <= high for low, high in zip(got.lower, got.upper, strict=True)
+            )
+        if tier != "float64" and got.status == OK:
+            assert set(got.cost.stages) & {"bound", "filter", "wide", "exact", "uncertain"}
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_all_pairs_at_every_tier(desk, tier) -> None:
+    for service, fields in (("Distance", {"max_distance": 8.0}), ("FirstContact", {"horizon": 5.0})):
+        got = desk.ask(service, select=ALL, accuracy=tier, **fields)
+        assert got.cost.accuracy == tier and ("left", "right") in set(zip(got.ids_a, got.ids_b, strict=True))
+        if service == "Distance":
+            near = desk.engine.scene.distances(8.0, accuracy=tier)
+            assert len(got.ids_a) == len(near) + len(near.unsupported)
+    near = desk.ask("Distance", select=BY_IDS, ids_a=["box", "left"], accuracy=tier)
+    assert near.ids_b == ["ball", "right"]
+
+
+def test_the_tier_of_the_configuration_is_the_default() -> None:
+    for tier in TIERS:
+        desk = Desk(accuracy=tier)
+        assert desk.ask("Distance", select=ALL, max_distance=1.0).cost.accuracy == tier
+        assert desk.ask("Distance", select=ALL, accuracy="float64").cost.accuracy == "float64"
+        assert desk.ask("Cull", select=ALL).cost.accuracy == desk.ask("CullBatch", **EMPTY_VIEW).cost.accuracy == tier
+        topics = desk.engine.evaluate(frozenset({"contacts", "distances", "visible"}))
+        assert topics.contacts.pairs.cost.accuracy == topics.distances.cost.accuracy == tier
+        assert topics.visible.cost.accuracy == tier
+
+
+EMPTY_VIEW = {"frustum": D(VIEW.packed())}
+
+
+def test_certificates_need_a_tier_that_leaves_something_to_prove(desk) -> None:
+    for service, fields in (
+        ("Distance", {"ids_a": ["ball"], "ids_b": ["box"]}),
+        ("Distance", {"ids_a": ["ball"], "ids_b": ["left"]}),
+        ("FirstContact", {"ids_a": ["ball"], "ids_b": ["box"]}),
+        ("Cull", {"ids": ["ball"]}),
+    ):
+        got = desk.ask(service, select=BY_IDS, accuracy="bound", certificates=True, **fields)
+        assert got.status == BAD_REQUEST and "certificates need accuracy float64 or exact" in got.message
+        assert is_empty(got)
+        got = desk.ask(service, select=BY_IDS, accuracy="exact", certificates=True, **fields)
+        assert got.status in (OK, UNSUPPORTED) and len(claims(got)) == 1
 
 
 @pytest.mark.parametrize(

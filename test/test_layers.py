@@ -46,6 +46,8 @@ PYTHON_LAYERS = {
 
 # Optional peers, imported on use.  "*" marks a file that may choose the module's name at run time.
 OPTIONAL = {
+    "geomsrv/_price_peers.py": ("coal", "fcl"),
+    "geomsrv/_price_report.py": ("PIL", "matplotlib", "rich"),
     "geomsrv/fcl_worker.py": ("coal", "fcl"),
     "geomsrv/robot.py": ("*",),
 }

@@ -139,6 +139,43 @@ def test_set_enabled(client) -> None:
     assert first.scene_version >= version, "nothing was evaluated while it was disabled"
 
 
+@pytest.mark.parametrize("tier", ["bound", "float32", "float64", "exact"])
+def test_tiers(client, tier) -> None:
+    """What each service answers at each tier; whoever does not says which it answers."""
+    camera = gs.Frustum([0, 0, -5], np.eye(3), 1.0, 1.0, 1.0, 20.0)
+    view = srv.Cull.Request(select=srv.Cull.Request.ALL, view=srv.Cull.Request.FRUSTUM, accuracy=tier)
+    convert.set_frustum(view.frustum, camera)
+    box = convert.doubles([0, 0, 0, *np.eye(3).ravel(), 1, 1, 1])
+    ring = {f"vertices_{s}": convert.doubles(SQUARE.vertices) for s in "ab"}
+    ring |= {f"offsets_{s}": convert.uint32s([0, 4]) for s in "ab"}
+    ring |= {f"velocities_{s}": convert.doubles([0.0, 0.0]) for s in "ab"}
+    pair = {"shapes_a": inline(gs.Sphere(1.0)), "poses_a": convert.doubles(IDENTITY)}
+    pair |= {"shapes_b": inline(gs.Sphere(1.0)), "poses_b": convert.doubles([3, 0, 0, 0, 0, 0, 1])}
+    by_ids = {"select": srv.Distance.Request.BY_IDS, "ids_a": ["ball"], "ids_b": ["box"]}
+    moving = {"select": srv.FirstContact.Request.ALL_PAIRS, "horizon": 5.0}
+    batch = {
+        "frustum": convert.doubles(camera.packed()),
+        "centers": box[:3],
+        "axes": box[3:12],
+        "half_extents": box[12:],
+    }
+    for kind, name, fields in (
+        (srv.Cull, "cull", view),
+        (srv.CullBatch, "cull_batch", batch),
+        (srv.Distance, "distance", by_ids),
+        (srv.Distance, "distance", {"select": srv.Distance.Request.INLINE, **pair}),
+        (srv.Distance, "distance", {"select": srv.Distance.Request.ALL_PAIRS, "max_distance": 9.0}),
+        (srv.DistanceBatch, "distance_batch", {"kind_a": 101, "values_a": box, "kind_b": 101, "values_b": box}),
+        (srv.FirstContact, "first_contact", moving),
+        (srv.FirstContactBatch, "first_contact_batch", ring),
+    ):
+        request = fields if kind is srv.Cull else kind.Request(accuracy=tier, **fields)
+        got = client.call(kind, name, request)
+        assert got.status == got.OK and got.cost.accuracy == tier, (name, got.message)
+    got = client.call(srv.Distance, "distance", srv.Distance.Request(accuracy=tier, **by_ids))
+    assert list(got.lower) == list(got.distance) if tier == "bound" else list(got.distance) == [0.5]
+
+
 BAD = [
     (srv.Distance, "distance", {"select": 0, "ids_a": ["nobody"], "ids_b": ["box"]}, "nobody"),
     (srv.Distance, "distance", {"select": 2, "accuracy": "great"}, "accuracy must be one of"),

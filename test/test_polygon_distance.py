@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import hard_cases, reproducer
 from oracle import polygon as exact
+from oracle.vectors import compare_root
 from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, slender_pair
 
 import geomsrv as gs
@@ -293,6 +294,37 @@ def test_distances_whose_squares_underflow(size):
     assert answer.distance[0] == pytest.approx(5e-200, rel=2.0**-52)
     np.testing.assert_allclose(answer.normal[0], [0.6, -0.8], rtol=2.0**-52)
     assert answer.lower[0] <= answer.distance[0] <= answer.upper[0]
+
+
+def _with_tiny_edges(rng):
+    """A ring of few bits, some vertices doubled at a distance that has no square."""
+    points = [tuple(p) for p in (rng.integers(-8, 9, (int(rng.integers(1, 6)), 2)) / 8).tolist()]
+    tiny = math.ldexp(float(rng.choice([-1, 1])), -int(rng.integers(300, 1074)))
+    return points + [(tiny, y) for x, y in points if x == 0.0] + [(x, tiny) for x, y in points if y == 0.0]
+
+
+@pytest.mark.parametrize("tier", ["float32", "float64"])
+def test_edges_whose_squares_underflow(rng, tier):
+    pairs = []
+    while len(pairs) < 300:
+        a, b = _with_tiny_edges(rng), _with_tiny_edges(rng)
+        if any(0 < abs(c) < 2.0**-300 for v in a + b for c in v):
+            shift = rng.integers(-8, 9, 2) / 8 * rng.integers(0, 2)
+            pairs.append((hull(a), hull(np.array(b) + shift)))
+    a, b = polygons(*(a for a, _ in pairs)), polygons(*(b for _, b in pairs))
+    wide = 0
+    for want in ((), ("penetration",)):
+        answer = gs.distance(a, b, accuracy=tier, want=want)
+        for i, (p, q) in enumerate(pairs):
+            given = reproducer(a=p, b=q)
+            truth = exact.separation(p, q).signed_square
+            truth = truth if want else max(truth, Fraction(0))
+            low, high = float(answer.lower[i]), float(answer.upper[i])
+            assert low <= answer.distance[i] <= high, given
+            wide += tier == "float64" and high - low > 1e-13
+            assert compare_root(low, truth) <= 0 <= compare_root(high, truth), given
+            assert np.isfinite([*answer.point_a[i], *answer.point_b[i], *answer.normal[i]]).all(), given
+    assert wide <= 6  # vertices so near to each other that neither is known to be the nearest
 
 
 def test_edges_parallel_beyond_all_digits():

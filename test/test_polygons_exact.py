@@ -313,22 +313,27 @@ def test_distance_against_the_oracle(rng, kind):
     assert reached[0] >= (10 if "integers" in kind else 0), reached
 
 
+def mixed_scene(rng):
+    rings = []
+    for _ in range(2):
+        size = 2.0 ** rng.integers(-1074, 900)
+        center = rng.normal(size=2) * 2.0 ** rng.integers(-1074, 900) * rng.integers(0, 2)
+        rings.append(hull(center + size * rng.integers(-8, 9, (int(rng.integers(1, 6)), 2))))
+    a, b = rings
+    velocity = tuple((rng.normal(size=2) * 2.0 ** rng.integers(-1074, 900)).tolist())
+    if rng.random() < 0.5:
+        velocity = tuple(0.25 * (x - y) for x, y in zip(a[0], b[0], strict=True))
+    return a, (0.0, 0.0), b, velocity
+
+
 def test_mixed_magnitudes(rng):
     """Rings that are far smaller than the pair, and coordinates down to the smallest double."""
     for _ in range(150):
-        rings = []
-        for _ in range(2):
-            size = 2.0 ** rng.integers(-1074, 900)
-            center = rng.normal(size=2) * 2.0 ** rng.integers(-1074, 900) * rng.integers(0, 2)
-            rings.append(hull(center + size * rng.integers(-8, 9, (int(rng.integers(1, 6)), 2))))
-        a, b = rings
+        scene = (*mixed_scene(rng), INF)
+        a, _, b, _, _ = scene
         signed = gs.distance(polygons(a), polygons(b), accuracy="exact", want=("penetration",))
         check_distance(signed, 0, a, b)
         check_witnesses(signed, 0, a, b)
-        velocity = tuple((rng.normal(size=2) * 2.0 ** rng.integers(-1074, 900)).tolist())
-        if rng.random() < 0.5:
-            velocity = tuple(0.25 * (x - y) for x, y in zip(a[0], b[0], strict=True))
-        scene = (a, (0.0, 0.0), b, velocity, INF)
         check_contact(contacts([scene]), 0, scene)
 
 
@@ -353,9 +358,8 @@ def test_times_beyond_the_doubles_are_times():
     assert contacts([(*scene[:4], math.nextafter(INF, 0.0))]).status[0] == gs.NEVER
 
 
-def test_large_polygons(rng):
-    """Beyond some size supports are found by walking."""
-    for count_a, count_b in ((40, 33), (90, 12)):
+def large_scenes(rng, counts=((40, 33), (90, 12))):
+    for count_a, count_b in counts:
         rings = [
             hull(
                 np.array([(3 * math.cos(t), 2 * math.sin(t)) for t in 2 * math.pi * (np.arange(n) + rng.random()) / n])
@@ -363,10 +367,15 @@ def test_large_polygons(rng):
             for n in (count_a, count_b)
         ]
         for offset, velocity in (((9.0, 1.0), (-1.0, 0.1)), ((5.9, 0.0), (-1.0, 0.1)), ((0.5, 0.25), (1.0, 2.0))):
-            scene = (rings[0], (0.0, 0.0), floats(shifted(rings[1], *offset)), velocity, INF)
-            check_contact(contacts([scene]), 0, scene)
-            signed = gs.distance(polygons(scene[0]), polygons(scene[2]), accuracy="exact", want=("penetration",))
-            check_distance(signed, 0, scene[0], scene[2])
+            yield rings[0], (0.0, 0.0), floats(shifted(rings[1], *offset)), velocity, INF
+
+
+def test_large_polygons(rng):
+    """Beyond some size supports are found by walking."""
+    for scene in large_scenes(rng):
+        check_contact(contacts([scene]), 0, scene)
+        signed = gs.distance(polygons(scene[0]), polygons(scene[2]), accuracy="exact", want=("penetration",))
+        check_distance(signed, 0, scene[0], scene[2])
 
 
 @pytest.mark.parametrize("tilt", [2.0**-k for k in (1, 20, 40, 50, 52)])
@@ -534,7 +543,7 @@ def tight(lower, upper):
     return (upper - lower) / np.maximum(np.abs(lower), np.abs(upper))
 
 
-@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("tier", ["bound", "float32"])
 @pytest.mark.parametrize("kind", SCENES)
 def test_what_lower_tiers_prove_of_contacts(rng, kind, tier):
     """Nothing is missed, what is certain is so, and times are within their bounds."""
@@ -567,7 +576,7 @@ def test_what_lower_tiers_prove_of_contacts(rng, kind, tier):
     assert min(reached[gs.NEVER], reached["certain"], reached[gs.WILL_TOUCH]) >= 50, reached
 
 
-@pytest.mark.parametrize("tier", ["bound"])
+@pytest.mark.parametrize("tier", ["bound", "float32"])
 @pytest.mark.parametrize("kind", SCENES)
 def test_what_lower_tiers_prove_of_distances(rng, kind, tier):
     scenes = [SCENES[kind](rng) for _ in range(200)]
@@ -584,3 +593,141 @@ def test_what_lower_tiers_prove_of_distances(rng, kind, tier):
         np.testing.assert_array_equal(answer.value[sure], truth.value[sure])
         assert (answer.value | ~truth.value).all()  # never a miss
         assert sure.sum() >= 10
+
+
+# What float32 knows of a distance, in terms of the size of the pair: an interval has two errors of a gap and two of a
+# width, 2 * (15 + 6) * 2**-24 of numbers up to three times as large.
+SINGLE = 2.0**-17
+
+
+def size_of(*rings):
+    """Of the pair, wherever it is."""
+    return float(np.ptp(np.concatenate(rings), axis=0).max())
+
+
+def check_single(scene, contact, signed, plain, meet):
+    """Answers of float32, one item each, against the oracle: nothing is claimed that is not so."""
+    a, velocity_a, b, velocity_b, t_max = scene
+    given = reproducer(scene=scene)
+    truth = exact.first_contact(a, velocity_a, b, velocity_b, t_max)
+    assert not contact.certain[0] or contact.status[0] == STATUS[truth.status], given
+    assert contact.certain[0] == (contact.status[0] in (gs.NEVER, gs.OVERLAPPING)) or contact.status[0] == gs.WILL_TOUCH
+    low, time, high = (float(x[0]) for x in (contact.time_lower, contact.time, contact.time_upper))
+    if contact.status[0] == gs.NEVER:
+        assert np.isnan([low, time, high, contact.last_time[0]]).all() and len(contact.points) == 0, given
+    else:
+        assert 0.0 <= low <= time <= high <= t_max and time <= contact.last_time[0] <= t_max, given
+        assert np.isfinite(contact.points).all() and len(contact.points) >= 1, given
+    if "NEVER" != truth.status:
+        assert contact.status[0] != gs.NEVER and low <= truth.time, given
+        assert not math.isfinite(high) or truth.time <= Fraction(high), given
+    square = exact.separation(a, b).signed_square
+    for answer, expected in ((signed, square), (plain, max(square, Fraction(0)))):
+        assert answer.lower[0] <= answer.distance[0] <= answer.upper[0], given
+        assert compare_root(float(answer.lower[0]), expected) <= 0 <= compare_root(float(answer.upper[0]), expected)
+        assert np.isfinite([*answer.point_a[0], *answer.point_b[0]]).all(), given
+        assert abs(math.hypot(*answer.normal[0]) - 1.0) <= 2.0**-50, given
+    assert meet.value[0] or square > 0, given
+    assert not meet.certain[0] or meet.value[0] == (square <= 0), given
+
+
+def single_answers(scene):
+    a, b = polygons(scene[0]), polygons(scene[2])
+    distances = (gs.distance(a, b, accuracy="float32", want=want) for want in (("penetration",), ()))
+    return contacts([scene], "float32"), *distances, gs.intersects(a, b, accuracy="float32")
+
+
+def test_float32_of_mixed_magnitudes(rng):
+    """What float cannot hold beside the rest of the pair is uncertain."""
+    reached = Counter()
+    for k in range(300):
+        scene = (*mixed_scene(rng), (INF, 1.0)[k % 2])
+        answers = single_answers(scene)
+        check_single(scene, *answers)
+        reached[int(answers[0].status[0])] += 1
+        reached["certain"] += answers[0].certain[0]
+    assert min(reached[s] for s in (gs.NEVER, gs.WILL_TOUCH, gs.OVERLAPPING)) >= 20, reached
+    assert reached["certain"] >= 200, reached
+
+
+def test_float32_of_large_polygons(rng):
+    for scene in large_scenes(rng, ((40, 33), (100, 90))):
+        answers = single_answers(scene)
+        check_single(scene, *answers)
+        assert answers[0].certain[0] and answers[3].certain[0]
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_float32_knows_seven_digits(rng, kind):
+    """Intervals are as narrow as promised; points are on the polygons, and as far apart as the distance says."""
+    scenes = [(*SCENES[kind](rng), INF) for _ in range(200)]
+    a, b = polygons(*(s[0] for s in scenes)), polygons(*(s[2] for s in scenes))
+    reached = Counter()
+    for want in ((), ("penetration",)):
+        answer, truth = (gs.distance(a, b, accuracy=t, want=want) for t in ("float32", "exact"))
+        certain = gs.intersects(a, b, accuracy="float32").certain
+        for i, (p, _, q, _, _) in enumerate(scenes):
+            given = reproducer(a=p, b=q)
+            size = size_of(p, q)
+            assert answer.upper[i] - answer.lower[i] <= SINGLE * size, given
+            assert abs(answer.distance[i] - truth.distance[i]) <= SINGLE * size, given
+            points = answer.point_a[i], answer.point_b[i]
+            far = 2.0**-50 * np.abs(np.concatenate([p, q])).max()
+            apart = points[1] - points[0] - answer.distance[i] * answer.normal[i]
+            if want or truth.distance[i] > 0:
+                assert np.abs(apart).max() <= SINGLE * size + far, given
+                for point, ring in zip(points, (p, q), strict=True):
+                    off = exact.separation([tuple(point.tolist())], ring).signed_square
+                    assert off <= Fraction(far) ** 2, given
+            reached["certain"] += certain[i]
+    assert reached["certain"] >= (0.6 if "large" in kind else 0.75) * 2 * len(scenes), reached
+
+
+def test_float32_contact_sets_are_near_those_of_float64(rng):
+    """Where nothing is in doubt; across edges and corners, at every scale."""
+    reached = Counter()
+    for length, speed in ((0, 0), (-900, -600), (300, 500)):
+        scenes = [scaled(integer_scene(rng, 12), length, speed, INF) for _ in range(300)]
+        single, double = contacts(scenes, "float32"), contacts(scenes, "float64")
+        for i, (a, _, b, _, _) in enumerate(scenes):
+            points, expected = points_of(single, i), points_of(double, i)
+            if not (single.certain[i] and double.certain[i]) or single.status[i] == gs.NEVER:
+                continue
+            given = reproducer(scene=scenes[i])
+            assert np.isclose(single.time[i], double.time[i], rtol=1e-4, atol=0.0), given
+            assert single.last_time[i] == pytest.approx(double.last_time[i], rel=1e-4), given
+            if len(points) != len(expected):
+                reached["other"] += 1  # nearly parallel
+                continue
+            near = 1e-4 * size_of(a, b)
+            assert all(np.abs(expected - p).max(axis=1).min() <= near for p in points), given
+            if len(points) == 2 and single.status[i] != gs.OVERLAPPING:
+                assert np.abs(single.normal[i] - double.normal[i]).max() <= 1e-12, given
+            reached[len(points)] += 1
+    assert reached["other"] <= 3 and min(reached[1], reached[2], reached[4]) >= 20, reached
+
+
+@pytest.mark.parametrize(("length", "speed"), [(7, 0), (-3, 5), (-700, -700), (700, 0), (950, 900), (0, -900), (1, 1)])
+def test_law_float32_power_of_two_scale_is_bitwise(scenes, length, speed):
+    """The frame is scaled itself, so nothing leaves the range of float."""
+    one = contacts(scenes, "float32")
+    other = contacts([scaled(s[:4], length, speed, s[4]) for s in scenes], "float32")
+    np.testing.assert_array_equal(other.status, one.status)
+    np.testing.assert_array_equal(other.certain, one.certain)
+    for name in NUMBERS[1:]:
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name) * 2.0 ** (length - speed), rtol=2.0**-52)
+    np.testing.assert_array_equal(other.normal, one.normal)
+
+
+@pytest.mark.parametrize("t_max", [INF, 0.0])
+def test_float32_at_rest(t_max):
+    """Nothing approaches; what touches is not known to, unless it is one point."""
+    for shift, status, certain in ((2.0, gs.NEVER, True), (1.0, gs.TOUCHING, False), (0.5, gs.OVERLAPPING, True)):
+        answer = contacts([(SQUARE, (1, 2), shifted(SQUARE, shift, 0), (1, 2), t_max)], "float32")
+        assert (answer.status[0], answer.certain[0]) == (status, certain)
+        if status != gs.NEVER:
+            assert (answer.time_lower[0], answer.time_upper[0], answer.last_time[0]) == (0.0, 0.0, t_max)
+    meet = gs.intersects(polygons([(1e9, 1.0)]), polygons([(1e9, 1.0)]), accuracy="float32")
+    assert meet.value[0] and meet.certain[0]
+    near = gs.intersects(polygons([(1e9, 1.0)]), polygons([(1e9, math.nextafter(1.0, 2.0))]), accuracy="float32")
+    assert not near.value[0] and near.certain[0]

@@ -1043,9 +1043,6 @@ def test_bad_arguments_are_named():
             scene.first_contacts(wrong)
     with pytest.raises(gs.GeometryError, match="want"):
         scene.distances(1.0, want=("depth",))
-    for query in (lambda **k: scene.distances(1.0, **k), scene.nearest_pair, scene.contacts):
-        with pytest.raises(gs.NotAvailableError, match="exact"):
-            query(accuracy="exact")
     with pytest.raises(gs.GeometryError, match="frustum"):
         scene.cull("camera")
     with pytest.raises(gs.SceneError, match="itself"):

@@ -558,10 +558,10 @@ TIERS_ANSWERED = {
     "cull": EVERY,
     "distance_to_frustum": EVERY,
     "distance_to_frustum.2d": EVERY,
-    "first_contact": ("bound", "exact"),
-    "distance": ("bound", "exact"),
-    "distance.batches": ("bound", "exact"),
-    "intersects": ("bound", "exact"),
+    "first_contact": EVERY,
+    "distance": EVERY,
+    "distance.batches": EVERY,
+    "intersects": EVERY,
 }  #: besides float64
 
 

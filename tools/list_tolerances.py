@@ -16,11 +16,11 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "numerics.md"
 BEGIN, END = "<!-- tolerances: begin -->", "<!-- tolerances: end -->"
 
-CPP = re.compile(r"^(?:inline |static )*constexpr (?:double|Real) (k[A-Z]\w*) = ([^;]+);\s*(?://+<? ?(.*))?$")
+CPP = re.compile(r"^(?:inline |static )*constexpr (?:double|float|Real) (k[A-Z]\w*) = ([^;]+);\s*(?://+<? ?(.*))?$")
 PYTHON = re.compile(r"^(_?[A-Z][A-Z_0-9]+)(?:: \w+)? = ([-\d.(][^#]*|[A-Z_.\d* ()+-]*ROUND\w*[^#]*)(?:#:? ?(.*))?$")
 # Plain facts about float64, and numbers that decide nothing about an answer.
 NOT_TOLERANCES = re.compile(
-    r"^LOG_|kInfinity|kNaN|kNan|kLargest$|kSplitter|_TIMEOUT|_PERIOD|_PAUSE|LINE_|POINT_SIZE|SIZE$|LENGTH$|_SIDES"
+    r"^LOG_|kInfinity|kNaN|kNan|kLargest$|kSplitter|_TIMEOUT|_PERIOD|_PAUSE|LINE_|POINT_SIZE|SIZE$|LENGTH$|_SIDES|GRAIN$|SPACING$|PALE$|DECADES$"
 )
 # Whole numbers count things; texts and tuples are something else altogether.
 NOT_REAL = re.compile(r"^-?[\d_]+$|^\((?!\d[^,]*\))|\"")

@@ -185,7 +185,7 @@ class Handlers:
             start, counts = time.perf_counter_ns(), Counter[str]()
             world = world_of(_bodies(request.shapes, request.poses, ()))
             rows = np.arange(len(world))
-            state, certain, boxed = sight(world, rows, frustum, counts)
+            state, certain, boxed = sight(world, rows, frustum, accuracy, counts)
             message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
             cost = Cost(time.perf_counter_ns() - start, accuracy, dict(counts))
         elif request.select in (BY_IDS, ALL):
@@ -400,7 +400,7 @@ class Handlers:
         """Tier asked for, by default that of the configuration."""
         if request.tolerance != 0.0:
             raise NotAvailableError(f"tolerance={request.tolerance:g} is not available yet; it must be 0")
-        return _validate.accuracy(request.accuracy or self.engine.config.accuracy)
+        return _validate.accuracy(request.accuracy or self.engine.config.accuracy, queries.TIERS)
 
     def _allowed(self, *effects: str) -> None:
         """Refuse what the configuration has switched off."""

@@ -72,7 +72,7 @@ public:
 
     nb::tuple tuple() const {
         return nb::make_tuple(distance_.array, lower_.array, upper_.array, point_a_.array, point_b_.array,
-                              normal_.array, status_.array);
+                              normal_.array, status_.array, rung_.array);
     }
     nb::tuple everything() const {
         return nb::make_tuple(distance_.array, lower_.array, upper_.array, point_a_.array, point_b_.array,
@@ -193,18 +193,22 @@ nb::tuple distance_pairs(const Codes& kinds, const Rows4& params, const Rows3& v
 nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& vertices,
                           const Offsets& offsets, const Values& reach, const Offsets& shape,
                           const Rows7& poses, const Values& uncertainty, const Pairs& pairs,
-                          double pose_rounding, bool penetration) {
+                          double pose_rounding, bool penetration, std::string_view accuracy,
+                          const std::optional<Rows18>& frusta) {
     const std::size_t shapes = kinds.size();
     const std::size_t objects = shape.size();
     const std::size_t n = pairs.shape(0);
     if (params.shape(0) != shapes || offsets.size() != shapes + 1 || reach.size() != shapes ||
-        poses.shape(0) != objects || uncertainty.size() != objects) {
+        poses.shape(0) != objects || uncertainty.size() != objects ||
+        (frusta && frusta->shape(0) != shapes)) {
         throw nb::value_error("distance_placed: arrays of different length");
     }
     const Answers out(n, false);
+    const Wanted wanted{penetration, tier_of(accuracy)};
     {
         const nb::gil_scoped_release unlocked;
-        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data());
+        const ShapeTable table(shapes, kinds.data(), params.data(), vertices.data(), offsets.data(),
+                               frusta ? frusta->data() : nullptr);
         std::vector<double> scratch(6 * longest(offsets.data(), shapes));
         const auto placed = [&](std::int64_t row) {
             const std::int64_t k = shape.data()[row];
@@ -213,8 +217,8 @@ nb::tuple distance_placed(const Codes& kinds, const Rows4& params, const Rows3& 
         };
         for (std::size_t i = 0; i < n; ++i) {
             const std::int64_t* pair = pairs.data() + 2 * i;
-            out.set(i, placed_distance(placed(pair[0]), placed(pair[1]), pose_rounding, penetration,
-                                       scratch.data()));
+            out.set(i,
+                    placed_distance(placed(pair[0]), placed(pair[1]), pose_rounding, wanted, scratch.data()));
         }
     }
     return out.tuple();
@@ -408,7 +412,8 @@ void define_distance(nb::module_& m) {
     m.def("distance_placed", distance_placed, nb::arg("kinds").noconvert(), nb::arg("params").noconvert(),
           nb::arg("vertices").noconvert(), nb::arg("offsets").noconvert(), nb::arg("reach").noconvert(),
           nb::arg("shape").noconvert(), nb::arg("poses").noconvert(), nb::arg("uncertainty").noconvert(),
-          nb::arg("pairs").noconvert(), nb::arg("pose_rounding"), nb::arg("penetration"));
+          nb::arg("pairs").noconvert(), nb::arg("pose_rounding"), nb::arg("penetration"),
+          nb::arg("accuracy") = "float64", nb::arg("frusta").noconvert() = nb::none());
     define(m, "distance_world", "distance_world_stages", distance_world<Answers>, distance_world<Stages>,
            nb::arg("a"), nb::arg("b"), nb::arg("penetration"), nb::arg("accuracy") = "float64",
            nb::arg("evidence") = false);

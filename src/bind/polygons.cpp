@@ -15,6 +15,7 @@
 #include "geom/polygon_distance_exact.hpp"
 #include "geom/polygon_first_contact.hpp"
 #include "geom/polygon_first_contact_exact.hpp"
+#include "geom/polygon_single.hpp"
 
 namespace geomsrv::bind {
 
@@ -171,10 +172,13 @@ void distances(const Rings& a, const Rings& b, bool penetration, const DistanceR
 }
 
 /// Calls `work` with the solver of a tier.
-template <class Bound, class Float64, class Exact, class Work>
+template <class Bound, class Float32, class Float64, class Exact, class Work>
 auto at_tier(std::string_view accuracy, const Work& work) {
     if (accuracy == "bound") {
         return work(std::type_identity<Bound>{});
+    }
+    if (accuracy == "float32") {
+        return work(std::type_identity<Float32>{});
     }
     if (accuracy == "exact") {
         return work(std::type_identity<Exact>{});
@@ -236,10 +240,10 @@ void define_polygons(nb::module_& m) {
             std::vector<Vec2> found;
             {
                 const nb::gil_scoped_release unlocked;
-                found = at_tier<BoundFirstContactSolver, FirstContactSolver, ExactFirstContactSolver>(
-                    accuracy, [&]<class S>(S /*tier*/) {
-                        return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
-                    });
+                found = at_tier<BoundFirstContactSolver, SingleFirstContactSolver, FirstContactSolver,
+                                ExactFirstContactSolver>(accuracy, [&]<class S>(S /*tier*/) {
+                    return first_contacts<typename S::type>(a, b, t_max, contact_set, rows, counts);
+                });
             }
             return nb::make_tuple(status.array, time.array, time_lower.array, time_upper.array,
                                   last_time.array, normal.array, rows_of(std::move(found)),
@@ -278,10 +282,10 @@ void define_polygons(nb::module_& m) {
             RungCounts counts{};
             {
                 const nb::gil_scoped_release unlocked;
-                at_tier<BoundPolygonDistanceSolver, PolygonDistanceSolver, ExactPolygonDistanceSolver>(
-                    accuracy, [&]<class S>(S /*tier*/) {
-                        distances<typename S::type>(a, b, penetration, rows, counts);
-                    });
+                at_tier<BoundPolygonDistanceSolver, SinglePolygonDistanceSolver, PolygonDistanceSolver,
+                        ExactPolygonDistanceSolver>(accuracy, [&]<class S>(S /*tier*/) {
+                    distances<typename S::type>(a, b, penetration, rows, counts);
+                });
             }
             return nb::make_tuple(distance.array, lower.array, upper.array, point_a.array, point_b.array,
                                   normal.array, status.array, meet.array, certain.array,

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "geom/place.hpp"
 
 namespace geomsrv {
 
@@ -11,6 +14,9 @@ namespace {
 
 // Center, half sizes, radius, a difference, a length and a sum: fewer than 16 roundings of numbers up to S.
 constexpr double kBoundingError = 16 * kUnitRoundoff;
+
+// What these lose where they end below the normal range, which sizes next to a half space may do.
+constexpr double kUnderflow = 16 * std::numeric_limits<double>::denorm_min();
 
 /// An axis-parallel box and a ball about its middle, both around the body.
 struct Volumes {
@@ -24,19 +30,22 @@ double at(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 Volumes volumes_of(const Core& core) {
     Volumes out;
+    // Squares must neither overflow nor underflow.
+    const double unit = in_range(core.reach) ? 1.0 : scale_for(core.reach);
     if (core.points == nullptr) {
         out.center = out.member = core.center;
         double square = 0.0;
         for (int i = 0; i < core.generators; ++i) {
-            const Vec3 g = core.generator[i];
-            out.half = out.half + Vec3{std::abs(g.x), std::abs(g.y), std::abs(g.z)};
+            const Vec3 own = core.generator[i];
+            const Vec3 g = unit * own;
+            out.half = out.half + Vec3{std::abs(own.x), std::abs(own.y), std::abs(own.z)};
             square += dot(g, g);
             // Where they are not quite perpendicular, some corner is further away.
             for (int k = 0; k < i; ++k) {
-                square += 2.0 * std::abs(dot(g, core.generator[k]));
+                square += 2.0 * std::abs(dot(g, unit * core.generator[k]));
             }
         }
-        out.radius = std::sqrt(square);
+        out.radius = std::sqrt(square) / unit;
         return out;
     }
     const double* x = core.points;
@@ -52,11 +61,11 @@ Volumes volumes_of(const Core& core) {
     out.half = 0.5 * (upper - lower);
     double square = 0.0;
     for (int i = 0; i < core.count; ++i) {
-        const Vec3 arm = Vec3{x[i], y[i], z[i]} - middle;
+        const Vec3 arm = unit * (Vec3{x[i], y[i], z[i]} - middle);
         square = std::max(square, dot(arm, arm));
     }
     out.center = core.center + middle;
-    out.radius = std::sqrt(square);
+    out.radius = std::sqrt(square) / unit;
     out.member = vertex_of(core, 0);
     return out;
 }
@@ -112,7 +121,8 @@ CoreSeparation bounding_distance(const Core& a, const PlacedHalfSpace& b) {
     const CoreSeparation center = convex_half_space(point, b, true);
     point.center = volumes.member;
     const CoreSeparation member = convex_half_space(point, b, true);
-    return bounded(center.lower - volumes.radius, member.upper, center.normal, kBoundingError * a.reach);
+    return bounded(center.lower - volumes.radius, member.upper, center.normal,
+                   kBoundingError * a.reach + kUnderflow);
 }
 
 }  // namespace geomsrv

@@ -13,7 +13,8 @@ namespace geomsrv {
 
 namespace {
 
-CoreSeparation from_gjk(const Core& a, const Core& b, const Gjk& found, Stage stage) {
+template <class Body>
+CoreSeparation from_gjk(const Body& a, const Body& b, const Gjk& found, Stage stage) {
     CoreSeparation out = certify_apart(a, b, found.normal, found.point_a, found.point_b);
     out.stage = stage;
     out.iterations = found.iterations;
@@ -23,22 +24,37 @@ CoreSeparation from_gjk(const Core& a, const Core& b, const Gjk& found, Stage st
 }
 
 /// Bodies that overlap where nobody asked how deep: a common point.
-CoreSeparation sunk(const Core& a, const Core& b, const Gjk& found, Stage stage) {
+template <class Body>
+CoreSeparation sunk(const Body& a, const Body& b, const Gjk& found, Stage stage) {
     CoreSeparation out = from_gjk(a, b, found, stage);
     out.lower = std::min(out.lower, 0.0);
     out.value = 0.0;
     if (found.state == GjkState::enclosed) {
-        out.upper = std::min(out.upper, kVertexError * (a.reach + b.reach) + a.error + b.error);
+        const double rounding = Body::kCoarseness * kVertexError * (a.reach + b.reach);
+        out.upper = std::min(out.upper, rounding + a.error + b.error);
     }
     out.outcome = Outcome::ok;
     out.normal = nan_vector();
     return out;
 }
 
-CoreSeparation measured_depth(const Core& a, const Core& b, const Gjk& start, Stage stage) {
+template <class Body>
+Gjk deepest_points(const Body& a, const Body& b, Vec3 normal) {
+    const double gap = lowest(b, normal).value - highest(a, normal).value;
+    const Body apart = moved(b, normal, -gap);
+    Gjk found = gjk(a, apart, normal);
+    if (found.state == GjkState::stalled) {
+        found = gjk_wide(a, apart, normal);
+    }
+    found.point_b = found.point_b + gap * normal;
+    return found;
+}
+
+template <class Body>
+CoreSeparation measured_depth(const Body& a, const Body& b, const Gjk& start, Stage stage) {
     // What the points prove from above holds whether the bodies overlap or not.
     const double size = a.reach + b.reach;
-    const double apart_at_most = start.length * (1.0 + kGapScale) + kMemberError * size;
+    const double apart_at_most = start.length * (1.0 + kGapScale) + Body::kCoarseness * kMemberError * size;
 
     if (a.points == nullptr && b.points == nullptr) {
         const FacetAxis axis = deepest_facet(a, b);
@@ -46,7 +62,7 @@ CoreSeparation measured_depth(const Core& a, const Core& b, const Gjk& start, St
             const double upper = axis.upper < 0.0 ? axis.upper : apart_at_most;
             CoreSeparation out = certify_deep(a, b, axis.normal, start.point_a, start.point_b, upper);
             if (out.converged) {
-                const Gjk deepest = points_along(a, b, out.normal);
+                const Gjk deepest = deepest_points(a, b, out.normal);
                 out.point_a = deepest.point_a;
                 out.point_b = deepest.point_b;
                 out.witness = deepest.witness;
@@ -73,7 +89,7 @@ CoreSeparation measured_depth(const Core& a, const Core& b, const Gjk& start, St
     out.iterations = start.iterations + facet.iterations;
     out.stage = Stage::hull;
     if (!facet.foot) {
-        const Gjk deepest = points_along(a, b, out.normal);
+        const Gjk deepest = deepest_points(a, b, out.normal);
         out.point_a = deepest.point_a;
         out.point_b = deepest.point_b;
         out.witness = deepest.witness;
@@ -81,28 +97,15 @@ CoreSeparation measured_depth(const Core& a, const Core& b, const Gjk& start, St
     return out;
 }
 
-CoreSeparation depth(const Core& a, const Core& b, const Gjk& start, Stage stage) {
+template <class Body>
+CoreSeparation depth(const Body& a, const Body& b, const Gjk& start, Stage stage) {
     CoreSeparation out = measured_depth(a, b, start, stage);
     out.simplex = start.witness;
     return out;
 }
 
-}  // namespace
-
-Gjk points_along(const Core& a, const Core& b, Vec3 normal) {
-    const double gap = lowest(b, normal).value - highest(a, normal).value;
-    Core moved = b;
-    moved.center = b.center - gap * normal;
-    moved.reach = b.reach + std::abs(gap);
-    Gjk found = gjk(a, moved, normal);
-    if (found.state == GjkState::stalled) {
-        found = gjk_wide(a, moved, normal);
-    }
-    found.point_b = found.point_b + gap * normal;
-    return found;
-}
-
-CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
+template <class Body>
+CoreSeparation separation(const Body& a, const Body& b, bool penetration) {
     Stage stage = Stage::gjk;
     Gjk found = gjk(a, b, first_direction(a, b));
     if (found.state == GjkState::stalled) {
@@ -123,6 +126,18 @@ CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
             break;
     }
     return from_gjk(a, b, found, stage);
+}
+
+}  // namespace
+
+Gjk points_along(const Core& a, const Core& b, Vec3 normal) { return deepest_points(a, b, normal); }
+
+CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration) {
+    return separation(a, b, penetration);
+}
+
+CoreSeparation convex_convex(const SingleCore& a, const SingleCore& b, bool penetration) {
+    return separation(a, b, penetration);
 }
 
 }  // namespace geomsrv

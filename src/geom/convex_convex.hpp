@@ -11,6 +11,9 @@ namespace geomsrv {
 /// With `penetration` overlapping cores get their depth; without it only a common point.
 CoreSeparation convex_convex(const Core& a, const Core& b, bool penetration);
 
+/// The same in single precision.
+CoreSeparation convex_convex(const SingleCore& a, const SingleCore& b, bool penetration);
+
 /// Deepest points along a normal: where a and b, moved out along it until they touch, have their nearest
 /// points.
 Gjk points_along(const Core& a, const Core& b, Vec3 normal);

@@ -21,6 +21,8 @@ namespace geomsrv {
 /// A convex polytope: center + all sums of +-generators (point, segment, box), or center + the hull of
 /// points.
 struct Core {
+    static constexpr double kCoarseness = 1.0;  ///< its roundoff in terms of kUnitRoundoff
+
     Vec3 center;
     Vec3 generator[3];               ///< half edges of a zonotope, taken literally
     int generators = 0;              ///< 0 point or hull, 1 segment, 3 box
@@ -86,6 +88,16 @@ inline Extreme lowest(const Core& core, Vec3 n) {
     const Extreme top = highest(core, -n);
     return {-top.value, top.vertex};
 }
+
+/// The core moved along a unit vector.
+inline Core moved(Core core, Vec3 along, double by) {
+    core.center = core.center + by * along;
+    core.reach += std::abs(by);
+    return core;
+}
+
+/// As doubles; see single_core.hpp.
+constexpr Vec3 widened(Vec3 v) { return v; }
 
 /// Highest vertex along a direction known to more than double precision.
 struct WideExtreme {

@@ -16,6 +16,7 @@
 #include "geom/point_point.hpp"
 #include "geom/point_segment.hpp"
 #include "geom/segment_segment.hpp"
+#include "geom/single_distance.hpp"
 
 namespace geomsrv {
 
@@ -94,20 +95,6 @@ void swap_bodies(CoreSeparation& s) {
     for (int i = 0; i < s.simplex.count; ++i) {
         std::swap(s.simplex.a[i], s.simplex.b[i]);
     }
-}
-
-/// Back to the caller's unit.  Only a result below the normal range rounds: then away from the value.
-void unscale(CoreSeparation& s, double scale) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    if (scale == 1.0) {
-        return;
-    }
-    const double unit = 1.0 / scale;
-    s.value *= unit;
-    s.lower = std::nextafter(s.lower * unit, -kInfinity);
-    s.upper = std::nextafter(s.upper * unit, kInfinity);
-    s.point_a = unit * s.point_a;
-    s.point_b = unit * s.point_b;
 }
 
 /// What the shape is larger than its core by [m].
@@ -257,13 +244,20 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
     };
     const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
     const auto solve = [&](const LocalPair& pair) {
+        const Placed& first = flip ? pair.b : pair.a;
+        const Placed& second = flip ? pair.a : pair.b;
+        const bool has_core = kernel != kUnsup && kernel != half_half;
         // Half spaces are their own bounding volumes.
-        if (wanted.tier == Tier::bound && kernel != kUnsup && kernel != half_half) {
-            const LocalPair sorted = flip ? LocalPair{pair.b, pair.a} : pair;
-            return unbounded ? bounding_distance(sorted.a.core, sorted.b.half_space)
-                             : bounding_distance(sorted.a.core, sorted.b.core);
+        if (wanted.tier == Tier::bound && has_core) {
+            return unbounded ? bounding_distance(first.core, second.half_space)
+                             : bounding_distance(first.core, second.core);
         }
-        return flip ? kernel(pair.b, pair.a, wanted.penetration) : kernel(pair.a, pair.b, wanted.penetration);
+        // Two of them have no size that single precision could be relative to.
+        if (wanted.tier == Tier::float32 && has_core) {
+            return unbounded ? single_distance(first.core, second.half_space, wanted.penetration)
+                             : single_distance(first.core, second.core, wanted.penetration);
+        }
+        return kernel(first, second, wanted.penetration);
     };
     const auto magnitude = [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); };
     if (wanted.tier == Tier::exact && kernel != kUnsup && !unbounded) {
@@ -313,8 +307,9 @@ Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& 
                 return exact_convex_convex({exact_body(a), pair.a.core}, {exact_body(b), pair.b.core}, scale,
                                            wanted);
             }
-            CoreSeparation out = wanted.tier == Tier::bound
-                                     ? bounding_distance(pair.a.core, pair.b.core)
+            CoreSeparation out = wanted.tier == Tier::bound ? bounding_distance(pair.a.core, pair.b.core)
+                                 : wanted.tier == Tier::float32
+                                     ? single_distance(pair.a.core, pair.b.core, wanted.penetration)
                                      : convex_convex(pair.a.core, pair.b.core, wanted.penetration);
             unscale(out, scale);
             return out;

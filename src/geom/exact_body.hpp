@@ -84,23 +84,22 @@ struct ExactBody {
     /// A point near the vertices, given literally: two bodies far from the origin are compared from there.
     [[nodiscard]] Vec3 anchor() const { return starts_at_apex() ? frustum->origin : center; }
 
-    /// A zonotope, or a hull of the listed points as they are.
-    [[nodiscard]] bool is_plain() const {
-        return kind == Kind::zonotope || (kind == Kind::hull && rotation == nullptr && is_zero(center));
-    }
-    /// Where the half edges of a vertex start; of a plain body only.
-    [[nodiscard]] Vec3 base_of(int vertex) const {
-        if (kind == Kind::zonotope) {
-            return center;
-        }
+    /// A zonotope or a hull: its vertices are short sums of products.
+    [[nodiscard]] bool is_plain() const { return kind != Kind::frustum; }
+    /// A listed point, of a hull only.
+    [[nodiscard]] Vec3 listed_point(int vertex) const {
         const double* p = points + 3 * static_cast<std::ptrdiff_t>(vertex);
         return {p[0], p[1], p[2]};
     }
+    /// Whether the listed points are meant as they are.
+    [[nodiscard]] bool is_unmoved() const { return rotation == nullptr && is_zero(center); }
+    /// A point given literally from which few numbers lead to a vertex; of a plain body only.
+    [[nodiscard]] Vec3 base_of(int vertex) const {
+        return kind == Kind::hull && is_unmoved() ? listed_point(vertex) : center;
+    }
 
     /// A frustum that is where its own numbers say.
-    [[nodiscard]] bool starts_at_apex() const {
-        return kind == Kind::frustum && rotation == nullptr && is_zero(center);
-    }
+    [[nodiscard]] bool starts_at_apex() const { return kind == Kind::frustum && is_unmoved(); }
 };
 
 /// factor * a, at no cost for the usual factor 1.
@@ -143,8 +142,7 @@ VectorOf<N> arm_times_denominator(const ExactBody& body, int vertex) {
             return v;
         }
         case ExactBody::Kind::hull: {
-            const double* p = body.points + 3 * static_cast<std::ptrdiff_t>(vertex);
-            return rotated(body.rotation, exactly<N>({p[0], p[1], p[2]}));
+            return rotated(body.rotation, exactly<N>(body.listed_point(vertex)));
         }
         case ExactBody::Kind::frustum:
             break;
@@ -184,9 +182,8 @@ VectorOf<N> step_times_denominator(const ExactBody& body, int from, int to) {
         return step;
     }
     if (body.kind == ExactBody::Kind::hull) {
-        const double* p = body.points + 3 * static_cast<std::ptrdiff_t>(from);
-        const double* q = body.points + 3 * static_cast<std::ptrdiff_t>(to);
-        return rotated(body.rotation, exactly<N>({q[0], q[1], q[2]}) - exactly<N>({p[0], p[1], p[2]}));
+        return rotated(body.rotation,
+                       exactly<N>(body.listed_point(to)) - exactly<N>(body.listed_point(from)));
     }
     return arm_times_denominator<N>(body, to) - arm_times_denominator<N>(body, from);
 }

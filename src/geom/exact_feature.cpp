@@ -3,8 +3,9 @@
 #include "geom/exact_feature.hpp"
 
 #include <cmath>
+#include <limits>
 
-#include "geom/lanes.hpp"
+#include "geom/lane_arithmetic.hpp"
 #include "geom/pair.hpp"
 
 namespace geomsrv {
@@ -21,7 +22,8 @@ bool rounded(const VectorOf<Enclosed>& v, Vec3& out) {
     constexpr double kNextToNothing = 0x1p-60;  // 2^-7 u, of the largest part
     out = {v.x.value.hi, v.y.value.hi, v.z.value.hi};
     const double size = std::max({std::fabs(out.x), std::fabs(out.y), std::fabs(out.z)});
-    return std::max({v.x.error, v.y.error, v.z.error}) <= kNextToNothing * size;
+    return std::max({v.x.error, v.y.error, v.z.error}) <= kNextToNothing * size &&
+           size < std::numeric_limits<double>::infinity();
 }
 
 // Weights may move the foot by this much of the size of the feature, in terms of the bound above, which is
@@ -122,87 +124,116 @@ GEOMSRV_INLINE void add(VectorOf<Pair<Fused>>& to, double factor, Vec3 axis) {
     to.z = to.z + product_of(factor, axis.z, kPair);
 }
 
+/// rotation * a, of a pair whose low part is the rest of one sum.
+template <bool Fused>
+GEOMSRV_INLINE VectorOf<Pair<Fused>> turned(const Mat3* rotation, const VectorOf<Pair<Fused>>& a) {
+    if (rotation == nullptr) {
+        return a;
+    }
+    const auto times = [](double factor, const Pair<Fused>& x) {
+        const Pair<Fused> product = product_of(factor, x.hi, std::type_identity<Pair<Fused>>{});
+        return Pair<Fused>{product.hi, product.lo + factor * x.lo};
+    };
+    const auto along = [&](Vec3 row) { return times(row.x, a.x) + times(row.y, a.y) + times(row.z, a.z); };
+    return {along(rotation->row[0]), along(rotation->row[1]), along(rotation->row[2])};
+}
+
+double sum_of_parts(Vec3 v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); }
+double largest_part(Vec3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
+
+// No entry of a rotation made from unit quaternions is larger, see kRotationStretch in place.cpp.
+constexpr double kLargestEntry = 1.0 + 0x1p-20;
+
 template <bool Fused>
 GEOMSRV_INLINE void evaluate_in_pairs(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out) {
-    const ExactBody& a = k.a().exact;
-    const ExactBody& b = k.b().exact;
     const auto without_rest = [](Vec3 x, Vec3 y) {
         const WideVec3 d = exact_difference(x, y);
         return VectorOf<Pair<Fused>>{{d.x.hi, d.x.lo}, {d.y.hi, d.y.lo}, {d.z.hi, d.z.lo}};
     };
+    const auto rounded_of = [](const VectorOf<Pair<Fused>>& x) { return Vec3{x.x.hi, x.y.hi, x.z.hi}; };
     VectorOf<Pair<Fused>> v[3] = {};  // a vertex, and the steps from it
-    v[0] = without_rest(b.base_of(s.b[0]), a.base_of(s.a[0]));
-    for (const ExactBody* body : {&a, &b}) {
-        const int* const vertex = body == &a ? s.a : s.b;
-        for (int i = 1; i < s.count && body->kind == ExactBody::Kind::hull; ++i) {
-            const VectorOf<Pair<Fused>> step =
-                without_rest(body->base_of(vertex[i]), body->base_of(vertex[0]));
-            v[i] = body == &a ? v[i] - step : v[i] + step;
+    // No part of them is larger, nor what it is the sum of; never so small that a product of six underflows.
+    double most[3] = {kSmallestReach, kSmallestReach, kSmallestReach};
+    v[0] = without_rest(k.b().exact.base_of(s.b[0]), k.a().exact.base_of(s.a[0]));
+    most[0] += largest_part(rounded_of(v[0]));
+    for (const bool of_b : {false, true}) {
+        const ExactAndRough& given = of_b ? k.b() : k.a();
+        const ExactBody& body = given.exact;
+        const int* const vertex = of_b ? s.b : s.a;
+        const auto add_turned = [&](int i, const VectorOf<Pair<Fused>>& arm) {
+            const VectorOf<Pair<Fused>> there = turned<Fused>(body.rotation, arm);
+            v[i] = of_b ? v[i] + there : v[i] - there;
+            most[i] += kLargestEntry * sum_of_parts(rounded_of(arm));
+        };
+        if (body.kind == ExactBody::Kind::hull) {
+            if (!body.is_unmoved()) {
+                add_turned(0, exactly<Pair<Fused>>(body.listed_point(vertex[0])));
+            }
+            for (int i = 1; i < s.count; ++i) {
+                if (vertex[i] != vertex[0]) {
+                    add_turned(i, without_rest(body.listed_point(vertex[i]), body.listed_point(vertex[0])));
+                }
+            }
+            continue;
         }
-        for (int g = 0; g < body->generators; ++g) {
-            const double half = body == &a ? -body->half[g] : body->half[g];
+        // The reach covers all half edges.
+        most[0] += given.rough.reach;
+        for (int i = 1; i < s.count; ++i) {
+            most[i] += vertex[i] != vertex[0] ? 2.0 * given.rough.reach : 0.0;
+        }
+        for (int g = 0; g < body.generators; ++g) {
+            const double half = of_b ? body.half[g] : -body.half[g];
             const int bit = vertex[0] >> g & 1;
-            add(v[0], bit != 0 ? half : -half, body->axis[g]);
+            add(v[0], bit != 0 ? half : -half, body.axis[g]);
             for (int i = 1; i < s.count; ++i) {
                 if ((vertex[i] >> g & 1) != bit) {
-                    add(v[i], bit != 0 ? -2.0 * half : 2.0 * half, body->axis[g]);
+                    add(v[i], bit != 0 ? -2.0 * half : 2.0 * half, body.axis[g]);
                 }
             }
         }
     }
     const FeatureOf<Pair<Fused>> quick(s.count, v[0], v[1], v[2]);
-    // A difference of two vertices, and all that it is the sum of, is no longer than this: the reaches cover
-    // the way between the points and all half edges.
-    const double longest = 2.0 * (k.a().rough.reach + k.b().rough.reach);
-    const auto vector = [](const VectorOf<Pair<Fused>>& x, double most) {
-        return VectorOf<Enclosed>{enclosed(x.x, most), enclosed(x.y, most), enclosed(x.z, most)};
+    const auto vector = [](const VectorOf<Pair<Fused>>& x, double at_most) {
+        return VectorOf<Enclosed>{enclosed(x.x, at_most), enclosed(x.y, at_most), enclosed(x.z, at_most)};
     };
+    // A part of a cross product is a sum of two products of parts, a dot product one of three.
+    const auto [w, e, f] = most;
     out.count = quick.count;
-    out.w = vector(quick.w, longest);
+    out.w = vector(quick.w, w);
     if (out.count == 1) {
         out.along = out.residue = out.w;
-        out.square = enclosed(quick.square, longest * longest);
+        out.square = enclosed(quick.square, 3.0 * w * w);
         out.divisor = Enclosed(1.0);
         return;
     }
-    // Of magnitudes, a cross product is no longer than sqrt(2) times the product of the lengths.
-    const double area = 2.0 * longest * longest;
-    out.e = vector(quick.e, longest);
+    out.e = vector(quick.e, e);
     if (out.count == 2) {
+        const double area = 2.0 * w * e;
         out.residue = vector(quick.residue, area);
-        out.along = vector(quick.along, 2.0 * longest * area);
-        out.square = enclosed(quick.square, area * area);
-        out.divisor = enclosed(quick.divisor, longest * longest);
+        out.along = vector(quick.along, 2.0 * e * area);
+        out.square = enclosed(quick.square, 3.0 * area * area);
+        out.divisor = enclosed(quick.divisor, 3.0 * e * e);
         return;
     }
-    out.f = vector(quick.f, longest);
+    const double area = 2.0 * e * f;
+    const double volume = 3.0 * area * w;
+    out.f = vector(quick.f, f);
     out.along = vector(quick.along, area);
-    out.residue.x = enclosed(quick.residue.x, area * longest);
-    out.square = enclosed(quick.square, area * longest * area * longest);
-    out.divisor = enclosed(quick.divisor, area * area);
+    out.residue.x = enclosed(quick.residue.x, volume);
+    out.square = enclosed(quick.square, volume * volume);
+    out.divisor = enclosed(quick.divisor, 3.0 * area * area);
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
-// One binary serves every x86-64.
-__attribute__((target("fma"), flatten)) void evaluate_fused(const Difference& k, const Witness& s,
-                                                            FeatureOf<Enclosed>& out) {
+// Everything in it melts into it, to be compiled for its instruction set.
+[[gnu::flatten]] GEOMSRV_FUSED void evaluate_fused(const Difference& k, const Witness& s,
+                                                   FeatureOf<Enclosed>& out) {
     evaluate_in_pairs<true>(k, s, out);
 }
-bool is_fused() {
-    static const bool known = __builtin_cpu_supports("fma") != 0;
-    return known;
-}
-#else
-void evaluate_fused(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out) {
-    evaluate_in_pairs<true>(k, s, out);
-}
-constexpr bool is_fused() { return false; }
-#endif
 
 }  // namespace
 
 void evaluate_quickly(const Difference& k, const Witness& s, FeatureOf<Enclosed>& out) {
-    if (is_fused()) {
+    if (has_fused()) {
         evaluate_fused(k, s, out);
     } else {
         evaluate_in_pairs<false>(k, s, out);

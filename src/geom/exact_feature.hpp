@@ -35,7 +35,7 @@ public:
     [[nodiscard]] double denominator_a() const { return a_.exact.denominator(); }
     [[nodiscard]] double denominator_b() const { return b_.exact.denominator(); }
     [[nodiscard]] bool in_range() const { return in_range_; }
-    /// Whether every vertex of K is a difference of two points that the caller gave, and some half edges.
+    /// Whether every vertex of K is a short sum of products of the caller's numbers.
     [[nodiscard]] bool is_plain() const { return a_.exact.is_plain() && b_.exact.is_plain(); }
     [[nodiscard]] Rung rung() const { return rung_; }
     void climb(Rung to) { rung_ = std::max(rung_, to); }
@@ -357,27 +357,54 @@ int lower_vertex(const Difference& k, const Witness& s, bool of_b, Vec3 n, const
         }
         return lowest == start ? -1 : lowest;
     }
-    const double base = dot(n, vertex_of(core, start) - core.center);
+    const double* const x = core.points;
+    const double* const y = x + core.count;
+    const double* const z = y + core.count;
+    const auto height = [=](int i) { return n.x * x[i] + n.y * y[i] + n.z * z[i]; };
+    const double base = height(start);
+    const double level = base + doubt;
+    double least = base - doubt;
     int lowest = -1;
-    double depth = -doubt;
+    // Those that doubts leave open; all from `rest` on if there are more.
+    constexpr int kFew = 8;
+    int open[kFew];
+    int opened = 0;
     const int count = body.exact.count();
+    int rest = count;
     for (int i = 0; i < count; ++i) {
-        const double height = dot(n, vertex_of(core, i) - core.center) - base;
-        if (height < depth) {
-            lowest = i;
-            depth = height;
+        const double value = height(i);
+        if (!(value > level)) [[unlikely]] {
+            if (value < least) {
+                lowest = i;
+                least = value;
+            } else if (opened < kFew) {
+                open[opened++] = i;
+            } else {
+                rest = std::min(rest, i);
+            }
         }
     }
-    for (int i = 0; i < count && lowest < 0; ++i) {
-        const double height = dot(n, vertex_of(core, i) - core.center) - base;
-        if (height > doubt || i == start || Level(k, s).has(of_b, i)) {
-            continue;
-        }
-        const int sign = sign_along(
-            [&](auto number) { return step_times_denominator<decltype(number)>(body.exact, start, i); });
-        lowest = sign < 0 ? i : -1;
+    if (lowest >= 0 || (opened == 1 && open[0] == start)) {
+        return lowest;
     }
-    return lowest;
+    const Level same(k, s);
+    const auto is_lower = [&](int i) {
+        return i != start && !same.has(of_b, i) &&
+               sign_along([&](auto number) {
+                   return step_times_denominator<decltype(number)>(body.exact, start, i);
+               }) < 0;
+    };
+    for (int j = 0; j < opened; ++j) {
+        if (is_lower(open[j])) {
+            return open[j];
+        }
+    }
+    for (int i = rest; i < count; ++i) {
+        if (!(height(i) > level) && is_lower(i)) {
+            return i;
+        }
+    }
+    return -1;
 }
 
 }  // namespace geomsrv

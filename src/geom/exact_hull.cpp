@@ -19,9 +19,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kDifferenceError = 2 * kVertexError + 2 * kUnitRoundoff;
 
 // A determinant of three rounded differences is off by 8 u of its permanent (orientation_3d.cpp), which is at
-// most the product of the rows' sums, 3 sqrt(3) times that of their lengths; the difference of two such
-// products takes some more.
-constexpr double kSideError = 64 * kUnitRoundoff;
+// most the product of the rows' sums; the difference of two such products takes 6 u of the larger one.
+constexpr double kSideError = 16 * kUnitRoundoff;
 
 // Plane of three points in doubles: see growing_hull.cpp.
 constexpr double kPlaneError = 6 * kUnitRoundoff;
@@ -63,11 +62,12 @@ private:
         const Vec3 g = w(f.vertex[2]) - w(f.vertex[0]);
         const Vec3 h = v.w - w(f.vertex[0]);
         const double determinant = dot(cross(e, g), h);
-        // Each of the three vectors is off by the errors of its ends.
-        const double lengths[3] = {norm(e), norm(g), norm(h)};
+        // Each of the three vectors is off by the errors of its ends; sums of parts are no less than lengths.
+        const auto sum = [](Vec3 x) { return std::abs(x.x) + std::abs(x.y) + std::abs(x.z); };
+        const double sums[3] = {sum(e), sum(g), sum(h)};
         const double off = 2.0 * error_;
-        const double most = (lengths[0] + off) * (lengths[1] + off) * (lengths[2] + off);
-        const double doubt = kSideError * most + (most - lengths[0] * lengths[1] * lengths[2]);
+        const double most = (sums[0] + off) * (sums[1] + off) * (sums[2] + off);
+        const double doubt = kSideError * most + (most - sums[0] * sums[1] * sums[2]);
         if (std::abs(determinant) > doubt) {
             return determinant > 0.0 ? 1 : -1;
         }

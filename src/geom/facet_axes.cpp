@@ -76,4 +76,8 @@ FacetAxis deepest_facet(const Core& a, const Core& b) {
     return best;
 }
 
+FacetAxis deepest_facet(const SingleCore& a, const SingleCore& b) {
+    return deepest_facet(widened(a), widened(b));
+}
+
 }  // namespace geomsrv

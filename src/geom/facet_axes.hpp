@@ -6,6 +6,7 @@
 #pragma once
 
 #include "geom/separation.hpp"
+#include "geom/single_core.hpp"
 
 namespace geomsrv {
 
@@ -18,5 +19,6 @@ struct FacetAxis {
 
 /// REQUIRES: neither core is a hull.
 FacetAxis deepest_facet(const Core& a, const Core& b);
+FacetAxis deepest_facet(const SingleCore& a, const SingleCore& b);
 
 }  // namespace geomsrv

@@ -19,13 +19,31 @@ constexpr int kMaxSteps = 100;
 // Below this times the size, the two points are one as far as the rounding of their vertices can tell.
 constexpr double kContact = 8 * kUnitRoundoff;
 
-/// What differs between the two arithmetics.
+/// What differs between the arithmetics.
 template <class T>
 struct Arithmetic;
 
 template <>
+struct Arithmetic<float> {
+    using Vec = Float3;
+    using Wider = double;
+    // As of doubles, in units of 2^-24.
+    static constexpr double kSideError = 128 * kUnitRoundoff * SingleCore::kCoarseness;
+    static Vec from(Vec3 v) { return rounded_to_single(v); }
+    static Vec3 to_vec3(Vec v) { return widened(v); }
+    static double to_double(float x) { return x; }
+    static Vec difference(Vec3 b, Vec3 a) { return rounded_to_single(b - a); }
+    static float root(float x) { return std::sqrt(x); }
+    static double absolute(float x) { return std::abs(x); }
+    // Of the smallest squares it would overflow; then any large number will do, since weights are normalised
+    // and lengths proven afterwards.
+    static float reciprocal(float x) { return std::min(1.0F / x, std::numeric_limits<float>::max()); }
+};
+
+template <>
 struct Arithmetic<double> {
     using Vec = Vec3;
+    using Wider = DoubleDouble;
     // Side of the origin with respect to a face: 3 differences of length <= 2 S multiplied, with at most 16
     // roundings.
     static constexpr double kSideError = 128 * kUnitRoundoff;
@@ -271,20 +289,22 @@ void set_points(Gjk& out, const Simplex<T>& simplex) {
 /// What is left of the vector between the witness points besides the gap.
 double aside(const Gjk& found) { return norm(found.point_b - found.point_a - found.gap * found.normal); }
 
-/// On needles and slivers, weights and direction from doubles are poor even where the length is good: once
-/// more, from the same vertices, in double-double.
-void polish(Gjk& out, const Simplex<double>& simplex, double size) {
-    Simplex<DoubleDouble> wide;
+/// On needles and slivers, weights and direction are poor even where the length is good: once more, from the
+/// same vertices, in about twice the precision.
+template <class T>
+void polish(Gjk& out, const Simplex<T>& simplex, double size) {
+    using Number = Arithmetic<typename Arithmetic<T>::Wider>;
+    Simplex<typename Arithmetic<T>::Wider> wide;
     wide.count = simplex.count;
     for (int i = 0; i < simplex.count; ++i) {
-        const Vertex<double>& v = simplex.vertex[i];
-        wide.vertex[i] = {v.index_a, v.index_b, v.a, v.b, exact_difference(v.b, v.a)};
+        const Vertex<T>& v = simplex.vertex[i];
+        wide.vertex[i] = {v.index_a, v.index_b, v.a, v.b, Number::difference(v.b, v.a)};
     }
-    const Nearest<DoubleDouble> nearest = Solver<DoubleDouble>(wide, size).solve().nearest;
+    const auto nearest = Solver<typename Arithmetic<T>::Wider>(wide, size).solve().nearest;
     reduce(wide, nearest);
     Gjk other = out;
     set_points(other, wide);
-    const Vec3 direction = narrow(nearest.direction);
+    const Vec3 direction = Number::to_vec3(nearest.direction);
     if (norm(direction) > 0.0) {
         other.normal = normalized(direction);
     }
@@ -294,13 +314,17 @@ void polish(Gjk& out, const Simplex<double>& simplex, double size) {
 }
 void polish(Gjk&, const Simplex<DoubleDouble>&, double) {}
 
-template <class T>
-Gjk run(const Core& a, const Core& b, Vec3 start) {
+template <class T, class Body>
+Gjk run(const Body& a, const Body& b, Vec3 start) {
     using Number = Arithmetic<T>;
+    // Both in units of the body's own roundoff.
+    constexpr double kMet = kMeetingGap * Body::kCoarseness;
+    constexpr double kOnePoint = kContact * Body::kCoarseness;
     const double size = a.reach + b.reach;
     Gjk out;
     Simplex<T> simplex;  // spans the feature of K that holds the nearest point so far
-    T squared = T{std::numeric_limits<double>::infinity()};
+    T squared{};
+    bool first = true;
     double length = std::numeric_limits<double>::infinity();
     typename Number::Vec n = Number::from(start);
     while (true) {
@@ -308,20 +332,20 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
         const auto top = highest(a, n);
         const auto bottom = lowest(b, n);
         const double gap = Number::to_double(bottom.value - top.value);
-        const bool met = length - gap <= kMeetingGap * size;
+        const bool met = length - gap <= kMet * size;
         if (gap > out.gap || met) {
             // If met, not an earlier direction that did as well: this one points from one nearest point to
             // the other.
             out.gap = gap;
             out.normal = Number::to_vec3(n);
         }
-        if (met || length <= kContact * size) {
+        if (met || length <= kOnePoint * size) {
             set_points(out, simplex);
-            if (aside(out) > kMeetingGap * size) {
+            if (aside(out) > kMet * size) {
                 polish(out, simplex, size);
             }
             // What counts is the length between the points, which have their own rounding.
-            const bool good = out.length <= (met ? out.gap + kMeetingGap * size : 2 * kContact * size);
+            const bool good = out.length <= (met ? out.gap + kMet * size : 2 * kOnePoint * size);
             out.state = !good ? GjkState::stalled : met ? GjkState::apart : GjkState::contact;
             return out;
         }
@@ -345,10 +369,11 @@ Gjk run(const Core& a, const Core& b, Vec3 start) {
             out.state = GjkState::enclosed;
             return out;
         }
-        if (!(answer.nearest.squared < squared) || ++out.iterations > kMaxSteps) {
+        if (!(first || answer.nearest.squared < squared) || ++out.iterations > kMaxSteps) {
             --simplex.count;
             break;
         }
+        first = false;
         reduce(simplex, answer.nearest);
         squared = answer.nearest.squared;
         length = Number::to_double(Number::root(squared));
@@ -372,8 +397,21 @@ Vec3 first_direction(const Core& a, const Core& b) {
     return d.x == 0.0 && d.y == 0.0 && d.z == 0.0 ? Vec3{1.0, 0.0, 0.0} : normalized(d);
 }
 
+Vec3 first_direction(const SingleCore& a, const SingleCore& b) {
+    const Float3 d = b.center - a.center;
+    return d.x == 0.0F && d.y == 0.0F && d.z == 0.0F ? Vec3{1.0, 0.0, 0.0} : normalized(widened(d));
+}
+
 Gjk gjk(const Core& a, const Core& b, Vec3 start) { return run<double>(a, b, start); }
 
+Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start) {
+    Gjk out = run<float>(a, b, start);
+    out.normal = normalized(out.normal);  // as doubles have it, to 4 u
+    return out;
+}
+
 Gjk gjk_wide(const Core& a, const Core& b, Vec3 start) { return run<DoubleDouble>(a, b, start); }
+
+Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start) { return run<double>(a, b, start); }
 
 }  // namespace geomsrv

@@ -7,6 +7,7 @@
 
 #include "geom/core.hpp"
 #include "geom/separation.hpp"
+#include "geom/single_core.hpp"
 
 namespace geomsrv {
 
@@ -32,11 +33,18 @@ struct Gjk {
 
 /// From the middle of a to that of b, where they differ.
 Vec3 first_direction(const Core& a, const Core& b);
+Vec3 first_direction(const SingleCore& a, const SingleCore& b);
 
 /// In double arithmetic, from the direction `start` (unit).
 Gjk gjk(const Core& a, const Core& b, Vec3 start);
 
-/// The same steps in double-double arithmetic, for what doubles cannot finish: needles and slivers.
+/// In single precision.
+Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start);
+
+/// In double-double arithmetic, for what doubles cannot finish: needles and slivers.
 Gjk gjk_wide(const Core& a, const Core& b, Vec3 start);
+
+/// In double arithmetic on vertices and supports of single precision.
+Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start);
 
 }  // namespace geomsrv

@@ -41,11 +41,15 @@ constexpr double kFlat = 16 * kUnitRoundoff;
 // multiplies three.
 constexpr double kNegligible = 0x1p-190;
 
-class GrowingHull : private HullSurface<GrowingHull> {
+template <class Body>
+class GrowingHull : private HullSurface<GrowingHull<Body>> {
     friend class HullSurface<GrowingHull>;
+    using Surface = HullSurface<GrowingHull>;
+    using Surface::at, Surface::enclose, Surface::grow, Surface::pop, Surface::push, Surface::w;
+    using Surface::facets_, Surface::vertices_;
 
 public:
-    GrowingHull(const Core& a, const Core& b) : a_(a), b_(b), size_(a.reach + b.reach) {}
+    GrowingHull(const Body& a, const Body& b) : a_(a), b_(b), size_(a.reach + b.reach) {}
 
     NearestFacet nearest(const Witness& seed) {
         NearestFacet out;
@@ -58,7 +62,7 @@ public:
         while (true) {
             const int f = pop();
             inner = facets_[at(f)].offset - facets_[at(f)].error;
-            if (facets_[at(f)].error > kPlaneDoubt * size_ && !facets_[at(f)].refined) {
+            if (facets_[at(f)].error > kDoubt * size_ && !facets_[at(f)].refined) {
                 facets_[at(f)] = measured_wide(facets_[at(f)]);
                 push(f);
                 continue;
@@ -69,7 +73,7 @@ public:
                 reach = support;
                 best = f;
             }
-            if (reach - inner <= kMeetingGap * size_ || static_cast<int>(vertices_.size()) >= kMaxVertices) {
+            if (reach - inner <= kMet * size_ || static_cast<int>(vertices_.size()) >= kMaxVertices) {
                 break;
             }
             if (side(facets_[at(f)], v) <= 0) {
@@ -88,9 +92,9 @@ public:
         out.normal = -facets_[at(best)].normal;
         // Proven only if the surface winds round the origin, which the sign of the nearest facet says for
         // all.
-        out.upper = inner > 0.0 ? -(inner - kDifferenceError * size_) : 0.0;
+        out.upper = inner > 0.0 ? -(inner - kOff * size_) : 0.0;
         // The direction may come from a facet of P that is no facet of K: then its plane lies inside.
-        if (reach - facets_[at(best)].offset <= kMeetingGap * size_) {
+        if (reach - facets_[at(best)].offset <= kMet * size_) {
             set_foot(facets_[at(best)], out);
         }
         return out;
@@ -133,7 +137,7 @@ private:
     /// Four vertices of K that span as much as can be found along a few directions.
     bool span(NearestFacet& out) {
         constexpr std::array<Vec3, 3> kAxes = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
-        const double thin = kFlat * size_;
+        const double thin = kThin * size_;
         vertices_.push_back(furthest(kAxes[0]));
         const Vec3 first = w(0);
         // The vertex that is furthest by `measure`, of those furthest along the directions.
@@ -252,18 +256,28 @@ private:
         }
         out.witness.count = 3;
         // On a sliver the weights may be noise.
-        out.foot = norm(out.point_b - out.point_a - foot) <= kMeetingGap * size_;
+        out.foot = norm(out.point_b - out.point_a - foot) <= kMet * size_;
     }
 
-    const Core& a_;
-    const Core& b_;
+    // The same in units of the body's own roundoff.
+    static constexpr double kMet = kMeetingGap * Body::kCoarseness;
+    static constexpr double kDoubt = kPlaneDoubt * Body::kCoarseness;
+    static constexpr double kThin = kFlat * Body::kCoarseness;
+    static constexpr double kOff = kDifferenceError * Body::kCoarseness;
+
+    const Body& a_;
+    const Body& b_;
     double size_;
 };
 
 }  // namespace
 
 NearestFacet nearest_facet(const Core& a, const Core& b, const Witness& seed) {
-    return GrowingHull(a, b).nearest(seed);
+    return GrowingHull<Core>(a, b).nearest(seed);
+}
+
+NearestFacet nearest_facet(const SingleCore& a, const SingleCore& b, const Witness& seed) {
+    return GrowingHull<SingleCore>(a, b).nearest(seed);
 }
 
 }  // namespace geomsrv

@@ -19,6 +19,7 @@
 #pragma once
 
 #include "geom/separation.hpp"
+#include "geom/single_core.hpp"
 
 namespace geomsrv {
 
@@ -35,5 +36,6 @@ struct NearestFacet {
 
 /// Facet of K nearest to the origin; `seed` are vertices of K to start from, best if they hold the origin.
 NearestFacet nearest_facet(const Core& a, const Core& b, const Witness& seed);
+NearestFacet nearest_facet(const SingleCore& a, const SingleCore& b, const Witness& seed);
 
 }  // namespace geomsrv

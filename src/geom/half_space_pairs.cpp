@@ -34,17 +34,17 @@ Vec3 common_point(const PlacedHalfSpace& a, const PlacedHalfSpace& b) {
     return (b.offset / dot(b.normal, b.normal)) * b.normal;  // parallel: the lower plane lies in both
 }
 
-}  // namespace
-
-CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool penetration) {
+template <class Body>
+CoreSeparation body_half_space(const Body& a, const PlacedHalfSpace& b, bool penetration) {
     const double length = norm(b.normal);
     const Vec3 up = {b.normal.x / length, b.normal.y / length, b.normal.z / length};
     const Extreme bottom = lowest(a, up);
     const double level = b.offset / length;
     const double value = bottom.value - level;
-    const double error = (kSupportError + kUnitError + 2 * b.normal_error) * a.reach + a.error +
-                         2 * b.offset_error + (kUnitError + 2 * b.normal_error) * std::abs(level) +
-                         kUnitError * std::abs(value) + kUnderflow;
+    const double rounding = Body::kCoarseness * (kSupportError + kUnitError);
+    const double error = (rounding + 2 * b.normal_error) * a.reach + a.error + 2 * b.offset_error +
+                         (kUnitError + 2 * b.normal_error) * std::abs(level) + kUnitError * std::abs(value) +
+                         kUnderflow;
     CoreSeparation out;
     out.value = value;
     out.lower = value - error;
@@ -58,6 +58,16 @@ CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool p
     out.witness.a[0] = bottom.vertex;
     out.witness.weight[0] = 1.0;
     return out;
+}
+
+}  // namespace
+
+CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool penetration) {
+    return body_half_space(a, b, penetration);
+}
+
+CoreSeparation convex_half_space(const SingleCore& a, const PlacedHalfSpace& b, bool penetration) {
+    return body_half_space(a, b, penetration);
 }
 
 CoreSeparation half_space_half_space(const PlacedHalfSpace& a, const PlacedHalfSpace& b) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "geom/separation.hpp"
+#include "geom/single_core.hpp"
 
 namespace geomsrv {
 
@@ -19,6 +20,9 @@ struct PlacedHalfSpace {
 /// Exact but for rounding: the depth of a convex body in a half space is that of its lowest point.  Without
 /// `penetration` that is a common point if it lies in the half space.
 CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool penetration);
+
+/// In single precision; the plane is as it is, in double.
+CoreSeparation convex_half_space(const SingleCore& a, const PlacedHalfSpace& b, bool penetration);
 
 /// Half spaces that face each other: the gap between their planes, or minus the thickness of what they share.
 /// All others share an unbounded part and cannot be parted: distance -infinity, no normal.

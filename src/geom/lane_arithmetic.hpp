@@ -25,6 +25,15 @@ struct TwoRoundings {
         const Lanes a2 = a - a1, b2 = b - b1;
         return ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2;
     }
+    /// square - root^2, where root is the rounded root of square.
+    GEOMSRV_INLINE static Lanes root_rest(const Lanes& square, const Lanes& root) {
+        const Lanes product = root * root;
+        return (square - product) - product_error(root, root, product);
+    }
+    /// One number where x is negative, another where it is positive; any of both where it is 0.
+    GEOMSRV_INLINE static Lanes by_sign(const Lanes& x, const Lanes& negative, const Lanes& positive) {
+        return select(x < Lanes(0.0), negative, positive);
+    }
 };
 
 #if !defined(GEOMSRV_ONE_PATH) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
@@ -38,6 +47,12 @@ struct OneRounding {
     }
     GEOMSRV_INLINE static Lanes product_error(const Lanes& a, const Lanes& b, const Lanes& product) {
         return multiply_add(a, b, -product);
+    }
+    GEOMSRV_INLINE static Lanes root_rest(const Lanes& square, const Lanes& root) {
+        return multiply_add(-root, root, square);
+    }
+    GEOMSRV_INLINE static Lanes by_sign(const Lanes& x, const Lanes& negative, const Lanes& positive) {
+        return Lanes(Lanes::Vector(__builtin_ia32_blendvpd256(positive.v, negative.v, x.v)));
     }
 };
 #pragma GCC diagnostic pop

@@ -23,14 +23,18 @@ double lost(double a, double b) {
     return std::fabs((a - (difference + taken)) + (taken - b));
 }
 
-/// Pose of b in a: the position turned into the axes of a, and conj(q_a) q_b.
+/// Pose of b in a: the position turned into the axes of a, and conj(q_a) q_b, normalised as
+/// geomsrv._validate.poses does, so that whoever asks about the same pose gets the same answer.
 Transform relative_pose(const double* a, const Mat3& rotation_a, const double* b) {
     const Vec3 step{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const double ax = a[3], ay = a[4], az = a[5], aw = a[6];
     const double bx = b[3], by = b[4], bz = b[5], bw = b[6];
-    return {rotation_of(aw * bx - ax * bw - ay * bz + az * by, aw * by + ax * bz - ay * bw - az * bx,
-                        aw * bz - ax * by + ay * bx - az * bw, aw * bw + ax * bx + ay * by + az * bz),
-            transposed_times(rotation_a, step)};
+    const double x = aw * bx - ax * bw - ay * bz + az * by;
+    const double y = aw * by + ax * bz - ay * bw - az * bx;
+    const double z = aw * bz - ax * by + ay * bx - az * bw;
+    const double w = aw * bw + ax * bx + ay * by + az * bz;
+    const double norm = std::sqrt(x * x + y * y + z * z + w * w);
+    return {rotation_of(x / norm, y / norm, z / norm, w / norm), transposed_times(rotation_a, step)};
 }
 
 /// How far from the origins the rounding of a rotation is felt: r_a + r_b + |p_ab|.  Of a half space, what
@@ -72,11 +76,11 @@ void widen_half_spaces(Separation& s, const PlacedShape& a, const PlacedShape& b
 
 }  // namespace
 
-Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double pose_rounding, bool penetration,
-                           double* scratch) {
+Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double pose_rounding,
+                           const Wanted& wanted, double* scratch) {
     const Transform X_a = pose_of(a.pose);
     const Transform X_ab = relative_pose(a.pose, X_a.rotation, b.pose);
-    Separation s = shape_distance(a.shape, b.shape, X_ab, {penetration}, scratch);
+    Separation s = shape_distance(a.shape, b.shape, X_ab, wanted, scratch);
     if (s.outcome == Outcome::unsupported) {
         return s;
     }
@@ -97,8 +101,11 @@ Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double po
         s.lower = std::nextafter(s.lower - slack, -kInfinity);
         s.upper = std::nextafter(s.upper + slack, kInfinity);
     }
-    if (!penetration && s.lower < 0.0) {
+    if (!wanted.penetration && s.lower < 0.0) {
         s.lower = 0.0;
+    }
+    if (s.rung == Rung::bound) {
+        s.distance = s.lower;
     }
     s.point_a = X_a * s.point_a;
     s.point_b = X_a * s.point_b;

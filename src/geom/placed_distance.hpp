@@ -16,9 +16,11 @@ struct PlacedShape {
     double uncertainty = 0.0;  ///< radius by which each of its points may be off [m]
 };
 
-/// Results in the common frame. `pose_rounding` is how far, relative to the two reaches and the distance of
-/// the origins, a rounded relative pose may move one shape against the other.
-Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double pose_rounding, bool penetration,
-                           double* scratch);
+/// What `shape_distance` answers for the pose of b in a, rounded and then taken literally; turned into the
+/// common frame. Only the interval covers more: the rounding of that pose, and the uncertainties. At tier
+/// bound `distance` stays its lower end. `pose_rounding` is how far, relative to the two reaches and the
+/// distance of the origins, a rounded relative pose may move one shape against the other.
+Separation placed_distance(const PlacedShape& a, const PlacedShape& b, double pose_rounding,
+                           const Wanted& wanted, double* scratch);
 
 }  // namespace geomsrv

@@ -12,15 +12,17 @@ namespace geomsrv {
 // Book section 10.4.2, in multiples of the half edges: the point is center + sum x_i g_i, the nearest point
 // of the box has every x_i clamped to -1..1.  A flat box has no x_i across its plane; what the point lacks
 // there remains in `off`.
-CoreSeparation point_box(const Core& a, const Core& b, bool penetration) {
-    const Vec3 to_point = a.center - b.center;
+template <class Body>
+CoreSeparation point_box(const Body& a, const Body& b, bool penetration) {
+    const Vec3 to_point = widened(a.center) - widened(b.center);
     Vec3 off = to_point;
-    Vec3 nearest = b.center;
+    Vec3 nearest = widened(b.center);
     Vec3 gap;  // from the point to the box, summed from its parts along the edges: no cancellation where it
                // is short
     bool outside = false;
     bool flat = false;
-    for (const Vec3 g : b.generator) {
+    for (const auto& edge : b.generator) {
+        const Vec3 g = widened(edge);
         const double squared = dot(g, g);
         if (squared == 0.0) {
             flat = true;
@@ -38,7 +40,7 @@ CoreSeparation point_box(const Core& a, const Core& b, bool penetration) {
         outside = outside || off.x != 0.0 || off.y != 0.0 || off.z != 0.0;
     }
     if (outside) {
-        CoreSeparation out = certify_apart(a, b, normalized(gap), a.center, nearest);
+        CoreSeparation out = certify_apart(a, b, normalized(gap), widened(a.center), nearest);
         if (out.converged) {
             out.stage = Stage::closed_form;
             return out;
@@ -47,5 +49,8 @@ CoreSeparation point_box(const Core& a, const Core& b, bool penetration) {
     // Inside, on the surface, or on a flat box: the facets decide.
     return convex_convex(a, b, penetration);
 }
+
+template CoreSeparation point_box(const Core&, const Core&, bool);
+template CoreSeparation point_box(const SingleCore&, const SingleCore&, bool);
 
 }  // namespace geomsrv

@@ -7,6 +7,7 @@
 
 namespace geomsrv {
 
-CoreSeparation point_box(const Core& a, const Core& b, bool penetration);
+template <class Body>
+CoreSeparation point_box(const Body& a, const Body& b, bool penetration);
 
 }  // namespace geomsrv

@@ -80,12 +80,9 @@ DepthRoot<Number, Sides> root_of(const FrustumSide<Plain<Number>> (&sides)[Sides
     Real sum[Sides], squares = view * view, code = 0.0;
     for (int i = 0; i < Sides; ++i) {
         const FrustumSide<Real>& side = sides[i];
-        const int s_choices = min_choices(side.window), t_choices = max_choices(side.window);
-        // S: no slope, the low one if it is of the first kind, the high one.  T: no slope, the low one.
-        const bool low = (s_choices == 3 && s % s_choices == 1) || t % t_choices == 1;
-        const bool high = s % s_choices == s_choices - 1;
-        s /= s_choices;
-        t /= t_choices;
+        const auto [low, high] = slope_choice(side.window, s, t);
+        s /= min_choices(side.window);
+        t /= max_choices(side.window);
         const Real low_part = low ? side.low : Real(0.0), high_part = high ? side.high : Real(0.0);
         sum[i] = low_part + high_part;
         squares += low_part * low_part + high_part * high_part;

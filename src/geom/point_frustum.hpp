@@ -55,11 +55,30 @@ enum class Window : std::uint8_t {
 constexpr int min_choices(Window window) { return window == Window::around ? 3 : 2; }
 constexpr int max_choices(Window window) { return window == Window::beyond ? 2 : 1; }
 
+/// Which slopes of a side are in S and T, by choices s and t.
+struct SlopeChoice {
+    bool low, high;
+};
+constexpr SlopeChoice slope_choice(Window window, int s, int t) {
+    // S: no slope, the low one if it is of the first kind, the high one.  T: no slope, the low one.
+    const int last = min_choices(window) - 1;
+    return {(last == 2 && s % 3 == 1) || t % max_choices(window) == 1, s % (last + 1) == last};
+}
+
 /// The windows of all sides, known at compile time.
 template <Window... Kind>
 struct Windows {
     static constexpr Window kKind[] = {Kind...};
     static constexpr int kMin = (min_choices(Kind) * ...), kMax = (max_choices(Kind) * ...);
+
+    /// Of side `index`.  Choices of all sides count them like digits, the first side fastest.
+    static constexpr SlopeChoice choice(int s, int t, int index) {
+        for (int i = 0; i < index; ++i) {
+            s /= min_choices(kKind[i]);
+            t /= max_choices(kKind[i]);
+        }
+        return slope_choice(kKind[index], s, t);
+    }
 };
 
 /// One side of a frustum: low_slope t <= x <= high_slope t at depth t.

@@ -51,7 +51,7 @@ WideFrame<Sides> wide_frame(const View<Sides>& view, const DistanceFrame<Lanes, 
 
 /// What the first step hands to the second, for a block of points.
 template <int Sides, int Size>
-struct Residuals {
+struct alignas(Lanes) Residuals {
     using Row = double[Size];
     Row coarse[Sides + 1], rest[Sides + 1];  ///< r
     Row rounder, region;
@@ -81,11 +81,12 @@ GEOMSRV_INLINE Halves<Lanes> halves(const Lanes& rounder, const Lanes& x) {
 // 2. Axes off orthonormal: the projection is that of c + defect (c - y).  What further projections leave of
 //    the defect is half the relative error times d, so relative_error m; their roundings are 32 u m (Gram
 //    matrix 12 u d, sums 6 u m).
-// 3. The depth, a max and min of roots: 11 u m (8 coefficients, 1 product, 2 sums), and 1 and 2 as vectors.
+// 3. The depth, a max and min of roots: 14 u m (1 slope, 1 product, 4 sums, 7 for the factor in common, 1 for
+//    its product), and 1 and 2 as vectors.
 // 4. Sides x - k t: 1 and 2 for x, 3 times |k| for t, 2 u |k| t for slope and product, 1 u for the
 //    difference: in all less than 1 + |k| times 3 and 5 u m.
 //
-// So (75 u + relative_error) m for the depth and 1 + |k| times that for a side.  If every comparison has more
+// So (78 u + relative_error) m for the depth and 1 + |k| times that for a side.  If every comparison has more
 // than this margin, the faces that hold Y are those found.
 inline constexpr double kWideMargin = 96.0 * kUnitRoundoff;
 
@@ -94,9 +95,11 @@ inline constexpr double kWideMargin = 96.0 * kUnitRoundoff;
 // 1. A component of r.  Rests are at most 2^-25 P, and sums of them 3.7 times that; a rounding is 2^-53 of
 //    its result.  Rest of p 1; six products with a rest 2.7, their sums 15.9; y's rests themselves 1.8, and y
 //    where it multiplies the axes' rests 0.9: 22.3, as a vector 38.7.
-// 2. The remainder of the square, halved by 2 d.  b, the rest of r, is at most 4.7 * 2^-25 P in each
-//    component, 8.2 as a vector; its own rounding 8.2.  The sum of b (2 a + b): 12.3 for 2 a + b, 8.2 for the
-//    products, 16.4 for sums; the rest of the root 2, the sum of both 9.2: 56.3.
+// 2. The square, halved by 2 d.  b, the rest of r, is at most 4.7 * 2^-25 P in each component, 8.2 as a
+//    vector; its own rounding 8.2.  The sum of 2 a b + b^2: 8.2 for the products, 16.4 for sums, 8.2 for the
+//    last.  If that sum is smaller than that of a^2, its sum with it, q, and what q lost are found exactly;
+//    the root's remainder and its step take less than 1: 42.  If it is not, d is less than 2^-20 P, and then
+//    no d passes Ziv's test.
 inline constexpr double kWideError = 100.0 * 0x1p-78;
 
 /// The region, and x - Y to 2^-73 of the reach, of four points.
@@ -147,17 +150,28 @@ GEOMSRV_INLINE void residual(const DistanceFrame<Lanes, Sides>& frame, const Wid
         Lanes lowest = z;
         unrolled<Kinds::kMax>([&](auto t) __attribute__((always_inline)) {
             if constexpr (s + t > 0) {
-                const auto& candidate = frame.roots[s * Kinds::kMax + t];
-                Lanes r = candidate.depth * z;
-                for (int i = 0; i < Sides; ++i) r = Arithmetic::multiply_add(candidate.side[i], x[i], r);
+                // The roots of `project`, with the factor that they have in common taken out.
+                Lanes sum = z;
+                unrolled<Sides>([&](auto i) __attribute__((always_inline)) {
+                    constexpr SlopeChoice kSlope = Kinds::choice(s, t, i);
+                    if constexpr (kSlope.low) {
+                        sum = Arithmetic::multiply_add(frame.side[i].low_slope, x[i], sum);
+                    }
+                    if constexpr (kSlope.high) {
+                        sum = Arithmetic::multiply_add(frame.side[i].high_slope, x[i], sum);
+                    }
+                });
+                const Lanes r = frame.roots[s * Kinds::kMax + t].depth * sum;
                 lowest = t == 0 ? r : lesser(lowest, r);
             }
         });
         root = s == 0 ? lowest : greater(root, lowest);
     });
     const Lanes depth = lesser(greater(root, frame.near), frame.far);
-    Lanes region = kept(root <= frame.near, Lanes(9.0)) + kept(frame.far <= root, Lanes(18.0));
-    Lanes margin = lesser(magnitude(root - frame.near), magnitude(root - frame.far));
+    // Codes are for comparisons that have their margin; equality has none.
+    const Lanes past_near = root - frame.near, past_far = root - frame.far;
+    Lanes region = Arithmetic::by_sign(past_near, 9.0, Arithmetic::by_sign(past_far, none, 18.0));
+    Lanes margin = lesser(magnitude(past_near), magnitude(past_far));
 
     Lanes y[kDimension];
     Halves<Lanes> split[kDimension];
@@ -166,22 +180,23 @@ GEOMSRV_INLINE void residual(const DistanceFrame<Lanes, Sides>& frame, const Wid
     for (int i = 0; i < Sides; ++i) {
         const FrustumSide<Lanes>& side = frame.side[i];
         const Lanes high = side.high_slope * depth, over = x[i] - high;
-        const LaneMask above = none < over;
         Lanes lost = Arithmetic::multiply_add(wide.high_rest[i], depth,
                                               Arithmetic::product_error(side.high_slope, depth, high));
+        lost = Arithmetic::by_sign(over, none, lost);
         margin = lesser(margin, magnitude(over));
         if (Kinds::kKind[i] == Window::centred) {
-            region = region + kept(above, select(c[i] < none, side.low_code, side.high_code));
-            lost = with_sign_of(c[i], kept(above, lost));
+            const Lanes code = Arithmetic::by_sign(c[i], side.low_code, side.high_code);
+            region = region + Arithmetic::by_sign(over, none, code);
+            lost = with_sign_of(c[i], lost);
             y[i] = with_sign_of(c[i], lesser(x[i], high));
         } else {
             const Lanes low = side.low_slope * depth, under = low - x[i];
-            const LaneMask below = none < under;
             margin = lesser(margin, magnitude(under));
-            region = region + (kept(above, side.high_code) + kept(below, side.low_code));
+            region = region + (Arithmetic::by_sign(over, none, side.high_code) +
+                               Arithmetic::by_sign(under, none, side.low_code));
             const Lanes lost_low = Arithmetic::multiply_add(
                 wide.low_rest[i], depth, Arithmetic::product_error(side.low_slope, depth, low));
-            lost = kept(above, lost) + kept(below, lost_low);
+            lost = lost + Arithmetic::by_sign(under, none, lost_low);
             y[i] = lesser(greater(x[i], low), high);
         }
         split[i] = halves(rounder, y[i]);
@@ -194,11 +209,14 @@ GEOMSRV_INLINE void residual(const DistanceFrame<Lanes, Sides>& frame, const Wid
     for (int k = 0; k < kDimension; ++k) {
         auto [coarse, rest] = halves(rounder, p[k]);
         rest = rest + p_error[k];
-        for (int i = 0; i < kDimension; ++i) {
+        // What is known first comes first.
+        for (int i = Sides; i >= 0; --i) {
             const auto& minus_axis = wide.minus_axes[i][k];
             coarse = Arithmetic::multiply_add(minus_axis.coarse, split[i].coarse, coarse);
-            rest = Arithmetic::multiply_add(minus_axis.coarse, split[i].rest, rest);
             rest = Arithmetic::multiply_add(minus_axis.rest, y[i], rest);
+        }
+        for (int i = Sides; i >= 0; --i) {
+            rest = Arithmetic::multiply_add(wide.minus_axes[i][k].coarse, split[i].rest, rest);
         }
         const auto [a, b] = halves(rounder, coarse);
         a.store(out.coarse[k] + first);
@@ -211,25 +229,23 @@ template <class Arithmetic, int Sides, int Size>
 GEOMSRV_INLINE WideDistance<Sides> length(const WideFrame<Sides>& wide, const Residuals<Sides, Size>& r,
                                           std::size_t first) {
     const Lanes none = 0.0, rounder = Lanes::load(r.rounder + first);
-    Lanes square = none, coarse = none, rest = none;
+    Lanes coarse, mixed, fine;
     for (int k = 0; k <= Sides; ++k) {
-        const Lanes a = Lanes::load(r.coarse[k] + first), b = Lanes::load(r.rest[k] + first), sum = a + b;
-        square = k == 0 ? sum * sum : Arithmetic::multiply_add(sum, sum, square);
+        const Lanes a = Lanes::load(r.coarse[k] + first), b = Lanes::load(r.rest[k] + first);
         coarse = k == 0 ? a * a : Arithmetic::multiply_add(a, a, coarse);
-        rest = k == 0 ? b * (a + sum) : Arithmetic::multiply_add(b, a + sum, rest);
+        mixed = k == 0 ? a * b : Arithmetic::multiply_add(a, b, mixed);
+        fine = k == 0 ? b * b : Arithmetic::multiply_add(b, b, fine);
     }
-    const Lanes root = square_root(square);
-    const auto [a, b] = halves(rounder, root);
-    const Lanes remainder =
-        Arithmetic::multiply_add(-a, a, coarse) + Arithmetic::multiply_add(-b, a + root, rest);
+    const Lanes rest = Arithmetic::multiply_add(Lanes(2.0), mixed, fine);
+    const Lanes square = coarse + rest, root = square_root(square);
+    const Lanes remainder = Arithmetic::root_rest(square, root) + ((coarse - square) + rest);
     const Lanes step = remainder * (Lanes(0.5) / root);
     const Lanes nearest = root + step, beyond = step - (nearest - root);
 
-    // d is within `off` of nearest + beyond (Ziv's test).
-    const Lanes off = rounder * wide.error;
-    const Lanes least = beyond - off, most = beyond + off;
-    const LaneMask one_rounding((nearest + least).v == (nearest + most).v);
-    const LaneMask one_side = none < least * most;
+    // d is within `off` of nearest + beyond (Ziv's test).  Doubles below a number are no wider apart than
+    // those above it, and where d is in the middle between two, nearest is the even one.
+    const Lanes off = rounder * wide.error, size = magnitude(beyond);
+    const LaneMask one_side = off < size, one_rounding((nearest - (size + off)).v == nearest.v);
     const LaneMask inside = Lanes::load(r.region + first) <= none, outside = ~inside;
     const LaneMask::Vector below = beyond.v < 0.0;  // -1 if so
     const Lanes lower = neighbour(nearest, below), upper = neighbour(lower, LaneMask::Vector{1, 1, 1, 1});

@@ -7,6 +7,7 @@
 
 namespace geomsrv {
 
-CoreSeparation point_point(const Core& a, const Core& b);
+template <class Body>
+CoreSeparation point_point(const Body& a, const Body& b);
 
 }  // namespace geomsrv

@@ -7,6 +7,7 @@
 
 namespace geomsrv {
 
-CoreSeparation point_segment(const Core& a, const Core& b);
+template <class Body>
+CoreSeparation point_segment(const Body& a, const Body& b);
 
 }  // namespace geomsrv

@@ -23,52 +23,15 @@
 
 #include "geom/double_double.hpp"
 #include "geom/exact_sign.hpp"
-#include "geom/lanes.hpp"
+#include "geom/polygon_widths.hpp"
+#include "geom/power_of_two.hpp"
 #include "geom/rounding.hpp"
 
 namespace geomsrv {
 
 namespace {
 
-constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Relative error of gap/|D| once the gap is known to its gap_error: squares and their sum 3 units of
-// kUnitRoundoff, halved by the root, root, quotient; the rest covers the bound.
-constexpr double kWidthError = 5.0 * kUnitRoundoff;
-
-// Lengths below are not resolved by their squares; an axis so short is taken to be this long.
-constexpr double kShortestAxis = 0x1p-500;
-
-struct Widest {
-    double lower;  ///< largest lower bound of gap/|D| over all axes
-    bool overlap;  ///< certainly gap < 0 along every axis
-};
-
-/// Leaves for every axis an upper bound of gap/|D| in work[0], and of the gap in work[1].
-GEOMSRV_WIDE_CLONES Widest widths_of(const PolygonPair& pair) {
-    const Lanes zero = 0.0;
-    Lanes widest = -kInfinity;
-    LaneMask overlap = zero <= zero;
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const Lanes dx = Lanes::load(p.dx + k);
-            const Lanes dy = Lanes::load(p.dy + k);
-            const Lanes gap = Lanes::load(p.gap + k);
-            const Lanes error = pair.gap_error() * (magnitude(dx) + magnitude(dy)) + Lanes(kPairUnderflow);
-            const Lanes length = greater<Lanes>(square_root(dx * dx + dy * dy), kShortestAxis);
-            const Lanes least = (gap - error) / length;
-            const Lanes most = (gap + error) / length;
-            // Padding has gap -1 and length kShortestAxis, so it is far below everything.
-            widest = greater<Lanes>(widest, least - kWidthError * magnitude(least));
-            (most + kWidthError * magnitude(most)).store(p.work[0] + k);
-            (gap + error).store(p.work[1] + k);
-            overlap = overlap & (gap + error < zero);
-        }
-    }
-    return {greatest(widest), all(overlap)};
-}
 
 /// A pair of points, one on each polygon: a vertex of the other polygon, and its nearest on an edge or vertex
 /// of `side`.
@@ -89,6 +52,16 @@ bool is_nearest_vertex(const PairedPolygon& p, std::size_t v, Vec2 to) {
     const Vec2 at = p.ring[v];
     return sign_of_dot(at, to, at, p.ring[p.next(v)]) <= 0 &&
            sign_of_dot(at, to, at, p.ring[p.previous(v)]) <= 0;
+}
+
+/// The vector, times a power of two if it is so short that its square would be lost.
+ExactVec2 resolved(const ExactVec2& v) {
+    const double size = std::max(std::fabs(v.x.hi), std::fabs(v.y.hi));
+    if (size >= kShortestAxis || size == 0.0) {
+        return v;
+    }
+    const PowerOfTwo up(-std::ilogb(size));
+    return {{up * v.x.hi, up * v.x.lo}, {up * v.y.hi, up * v.y.lo}};
 }
 
 /// Length of an exact vector.
@@ -158,6 +131,9 @@ Vec2 on_edge(Vec2 start, Vec2 end, double t) {
 // are rounded once each, their quotient once more; the fourth covers the bound.
 constexpr double kPlaceError = 4.0 * kUnitRoundoff;
 
+// Places beside an edge that is tiny count as no farther than this, so that their difference is a number.
+constexpr double kFarthest = 0x1p1000;
+
 /// Points of both polygons over each other on an axis: `own` on the axis' edge, `opposite` on the lowest
 /// vertex or edge of the other polygon; of two parallel edges the middle of their common part.
 struct Facing {
@@ -173,10 +149,15 @@ Facing facing_points(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
         return {start, q.ring[vertex]};
     }
     const Vec2 end = p.ring[p.next(axis.index)];
-    const ExactVec2 edge = pair.difference(end, start);
-    const double squared_length = enclosed_dot(edge, edge).value.hi;
+    const ExactVec2 given = pair.difference(end, start);
+    const ExactVec2 edge = resolved(given);
+    const double squared_length = enclosed_dot(edge, given).value.hi;  // but for the power of two
     const auto place = [&](std::size_t j) {
-        return enclosed_dot(edge, pair.difference(q.ring[j], start)).value.hi / squared_length;
+        const double at = enclosed_dot(edge, pair.difference(q.ring[j], start)).value.hi / squared_length;
+        return std::clamp(at, -kFarthest, kFarthest);
+    };
+    const auto share = [](double part, double whole) {
+        return whole != 0.0 ? std::clamp(part / whole, 0.0, 1.0) : 0.0;
     };
     const auto is_beside = [](double at) { return at < -kPlaceError || at > 1.0 + kPlaceError; };
     // The other polygon runs against this edge.
@@ -201,14 +182,13 @@ Facing facing_points(const PolygonPair& pair, AxisOf axis, std::size_t vertex) {
         const double to = place(neighbour);
         const double middle = 0.5 * (std::max(0.0, std::min(at, to)) + std::min(1.0, std::max(at, to)));
         return {on_edge(start, end, std::clamp(middle, 0.0, 1.0)),
-                on_edge(q.ring[vertex], q.ring[neighbour], std::clamp((middle - at) / (to - at), 0.0, 1.0))};
+                on_edge(q.ring[vertex], q.ring[neighbour], share(middle - at, to - at))};
     }
     const double nearest = std::clamp(at, 0.0, 1.0);
     const Vec2 own = on_edge(start, end, nearest);
     const std::size_t next = towards(vertex, at);
     if (is_beside(at) && next != vertex) {
-        const double way = (nearest - at) / (place(next) - at);
-        return {own, on_edge(q.ring[vertex], q.ring[next], std::clamp(way, 0.0, 1.0))};
+        return {own, on_edge(q.ring[vertex], q.ring[next], share(nearest - at, place(next) - at))};
     }
     return {own, q.ring[vertex]};
 }
@@ -234,7 +214,7 @@ PolygonDistance nearest_points(const PolygonPair& pair, double widest) {
                 continue;
             }
             const AxisOf axis{side, k};
-            const ExactVec2 direction = pair.exact_axis(axis);
+            const ExactVec2 direction = resolved(pair.exact_axis(axis));
             const DoubleDouble axis_length = length_of(direction);
             const std::size_t lowest = pair.lowest(axis);
             const Chain chain = pair.lowest(axis, lowest, {});
@@ -323,7 +303,7 @@ PolygonDistance deepest_points(const PolygonPair& pair, double widest) {
                 continue;
             }
             const AxisOf axis{side, k};
-            const ExactVec2 direction = pair.exact_axis(axis);
+            const ExactVec2 direction = resolved(pair.exact_axis(axis));
             const DoubleDouble axis_length = length_of(direction);
             const std::size_t lowest = pair.lowest(axis);
             const Enclosed gap = pair.enclosed_gap(axis, direction, lowest);

@@ -12,53 +12,13 @@
 #include <span>
 
 #include "geom/exact_sign.hpp"
-#include "geom/lanes.hpp"
-#include "geom/rounding.hpp"
+#include "geom/polygon_widths.hpp"
 
 namespace geomsrv {
 
 namespace {
 
-constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Relative error of gap/|D| once the gap is known to its gap_error: squares and their sum 3 units of
-// kUnitRoundoff, halved by the root, root, quotient; the rest covers the bound.
-constexpr double kWidthError = 5.0 * kUnitRoundoff;
-
-// Lengths below are not resolved by their squares; an axis so short is taken to be this long.
-constexpr double kShortestAxis = 0x1p-500;
-
-struct Widest {
-    double lower;  ///< largest lower bound of gap/|D| over all axes
-    bool overlap;  ///< certainly gap < 0 along every axis
-};
-
-/// Leaves for every axis an upper bound of gap/|D| in work[0], and of the gap in work[1].
-GEOMSRV_WIDE_CLONES Widest widths_of(const PolygonPair& pair) {
-    const Lanes zero = 0.0;
-    Lanes widest = -kInfinity;
-    LaneMask overlap = zero <= zero;
-    for (const int i : {0, 1}) {
-        const PairedPolygon& p = pair.side(i);
-        for (std::size_t k = 0; k < p.axes; k += kLanes) {
-            const Lanes dx = Lanes::load(p.dx + k);
-            const Lanes dy = Lanes::load(p.dy + k);
-            const Lanes gap = Lanes::load(p.gap + k);
-            const Lanes error =
-                Lanes(pair.gap_error()) * (magnitude(dx) + magnitude(dy)) + Lanes(kPairUnderflow);
-            const Lanes length = square_root(dx * dx + dy * dy);
-            const LaneMask is_long = Lanes(kShortestAxis) < length;
-            const Lanes least = (gap - error) / length;
-            const Lanes most = (gap + error) / length;
-            widest = greater(widest, select(is_long, least - kWidthError * magnitude(least), -kInfinity));
-            select(is_long, most + kWidthError * magnitude(most), kInfinity).store(p.work[0] + k);
-            (gap + error).store(p.work[1] + k);
-            overlap = overlap & (gap + error < zero);
-        }
-    }
-    return {greatest(widest), all(overlap)};
-}
 
 /// Where the other polygon is over an edge: its lowest vertex, or its lowest edge in the direction of this
 /// one.

@@ -11,17 +11,8 @@ namespace geomsrv {
 
 namespace {
 
-/// Numbers between these, and products of two of them, have all their bits in the range of double.
-constexpr double kSmallestSafe = 0x1p-400;
-constexpr double kLargestSafe = 0x1p400;
-
 bool is_safe(double x) { return std::fabs(x) > kSmallestSafe && std::fabs(x) < kLargestSafe; }
 bool is_safe_double(const Enclosed& x) { return x.value.lo == 0.0 && x.error == 0.0 && is_safe(x.value.hi); }
-
-// What `quotient` rounds, in units of u^2 of it, u = 2^-53: its first part is off by 2 u, so the rest is no
-// larger than 5 u.  That is found by three sums and a product (4 + 2 + 4 + 1) and multiplied by a number that
-// is off by u (10).  Rounded up.
-constexpr double kInverseError = 32.0 * kUnitRoundoff * kUnitRoundoff;
 
 /// a / b by one division, which several may share: inverse = 1 / b.hi.
 DoubleDouble quotient(DoubleDouble a, DoubleDouble b, double inverse) {
@@ -33,8 +24,6 @@ DoubleDouble quotient(DoubleDouble a, DoubleDouble b, double inverse) {
 
 /// a / b.
 Enclosed ratio(const Enclosed& a, const Enclosed& b) {
-    // For errors of b below this part of it 1 / (|b| - |db|) < (1 + 2 of it) / |b|.
-    constexpr double kSmallRelative = 0x1p-20;
     const double size = std::fabs(b.value.hi);
     if (!is_safe(a.value.hi) || !is_safe(size) || !(b.error < kSmallRelative * size)) {
         return a / b;

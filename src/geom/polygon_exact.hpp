@@ -18,9 +18,22 @@
 #include "geom/exact_number.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/polygon_pair.hpp"
+#include "geom/rounding.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
+
+/// Numbers between these, and products of two of them, have all their bits in the range of double.
+inline constexpr double kSmallestSafe = 0x1p-400;
+inline constexpr double kLargestSafe = 0x1p400;
+
+// What the quotient in `Wide::round_ratio` rounds, in units of u^2 of it, u = 2^-53: its first part is off by
+// 2 u, so the rest is no larger than 5 u.  That is found by three sums and a product (4 + 2 + 4 + 1) and
+// multiplied by a number that is off by u (10).  Rounded up.
+inline constexpr double kInverseError = 32.0 * kUnitRoundoff * kUnitRoundoff;
+
+// For errors of b below this part of it 1 / (|b| - |db|) < (1 + 2 of it) / |b|.
+inline constexpr double kSmallRelative = 0x1p-20;
 
 /// dot(a, b), without error where it is found without rest, as on a grid.
 inline Enclosed dot(const ExactVec2& a, const ExactVec2& b) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "geom/exact_sign.hpp"
+#include "geom/lane_arithmetic.hpp"
 #include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
@@ -339,6 +340,190 @@ private:
     Clip<A> other_;  // to compare with one of them
 };
 
+// ---- The usual case: one axis for the first contact, one for the last, both of edges, and a vertex in front
+// of the first one.  Both at once in the lanes of vectors; what it cannot tell is left to `Resolution`.
+
+/// Four pairs, see DoubleDouble.
+struct WideLanes {
+    Lanes hi, lo;
+};
+
+GEOMSRV_INLINE WideLanes sum_of(const Lanes& a, const Lanes& b) {
+    const Lanes sum = a + b, part = sum - a;
+    return {sum, (a - (sum - part)) + (b - part)};
+}
+GEOMSRV_INLINE WideLanes in_order(const Lanes& hi, const Lanes& lo) {
+    const Lanes sum = hi + lo;
+    return {sum, lo - (sum - hi)};
+}
+template <class Arithmetic>
+GEOMSRV_INLINE WideLanes product_of(const WideLanes& a, const WideLanes& b) {
+    const Lanes product = a.hi * b.hi;
+    const Lanes mixed = Arithmetic::multiply_add(a.hi, b.lo, a.lo * b.hi);
+    return in_order(product, Arithmetic::product_error(a.hi, b.hi, product) + mixed);
+}
+
+/// An edge, the vertex of the other polygon that is lowest along its normal, and the velocities of its own
+/// polygon and of the other.
+struct Facing {
+    Vec2 from, to, lowest, own_velocity, other_velocity;
+};
+
+/// When two gaps close, the direction of the first one's normal, and where a point is at the first time.
+struct Moments {
+    Rounding first, last;
+    Vec2 normal, place;
+};
+
+/// `Wide::direction` of a vector in the first two lanes: the same operations, so the same bits.  REQUIRES:
+/// its parts are safe, see kSmallestSafe, or zero.
+template <class Arithmetic>
+GEOMSRV_INLINE Vec2 direction_of(const WideLanes& v) {
+    const auto other = [](const Lanes& z) __attribute__((always_inline)) {
+        return Lanes(__builtin_shufflevector(z.v, z.v, 1, 0, 3, 2));
+    };
+    const Lanes product = v.hi * v.hi;
+    const WideLanes part =
+        in_order(product, Arithmetic::product_error(v.hi, v.hi, product) + (v.hi * v.lo + v.lo * v.hi));
+    const WideLanes sum = sum_of(part.hi, other(part.hi));
+    const WideLanes square = in_order(sum.hi, sum.lo + (part.lo + other(part.lo)));
+    const Lanes root = square_root(square.hi), inverse = Lanes(1.0) / root, again = root * root;
+    const Lanes root_rest =
+        Lanes(0.5) * inverse *
+        (((square.hi - again) - Arithmetic::product_error(root, root, again)) + square.lo);
+    const Lanes rough = v.hi * inverse, back = rough * root;
+    const Lanes rest =
+        ((v.hi - back) - Arithmetic::product_error(rough, root, back)) + (v.lo - rough * root_rest);
+    const Lanes unit = rough + rest * inverse;
+    return {unit[0], unit[1]};
+}
+
+/// False if in doubt.
+template <class Arithmetic>
+GEOMSRV_INLINE bool find_moments(const Facing& entry, const Facing& exit, Vec2 start, Vec2 velocity,
+                                 bool place, Moments& out) {
+    // Lanes: gap of the entry, gap of the exit, rate of the entry, rate of the exit.
+    using Vector = Lanes::Vector;
+    const auto twice = [](double a, double b)
+                           __attribute__((always_inline)) { return Lanes(Vector{a, b, a, b}); };
+    const auto four = [](double a, double b, double c, double d)
+                          __attribute__((always_inline)) { return Lanes(Vector{a, b, c, d}); };
+    const WideLanes normal_x = sum_of(twice(entry.to.y, exit.to.y), -twice(entry.from.y, exit.from.y));
+    const WideLanes normal_y = sum_of(twice(entry.from.x, exit.from.x), -twice(entry.to.x, exit.to.x));
+    const WideLanes arm_x =
+        sum_of(four(entry.lowest.x, exit.lowest.x, entry.own_velocity.x, exit.own_velocity.x),
+               -four(entry.from.x, exit.from.x, entry.other_velocity.x, exit.other_velocity.x));
+    const WideLanes arm_y =
+        sum_of(four(entry.lowest.y, exit.lowest.y, entry.own_velocity.y, exit.own_velocity.y),
+               -four(entry.from.y, exit.from.y, entry.other_velocity.y, exit.other_velocity.y));
+    const WideLanes x = product_of<Arithmetic>(normal_x, arm_x), y = product_of<Arithmetic>(normal_y, arm_y);
+    const WideLanes sum = sum_of(x.hi, y.hi);
+    const WideLanes n = in_order(sum.hi, sum.lo + (x.lo + y.lo));
+    const Lanes n_error = Lanes(kExactDotError) * (magnitude(x.hi) + magnitude(y.hi)) + Lanes(kPairUnderflow);
+    const LaneMask known = Lanes(kBoundRounding) * n_error < magnitude(n.hi);
+    const Vector hi = n.hi.v;
+    if (!all(known) || !(hi[0] > 0.0 && hi[1] < 0.0 && hi[2] > 0.0 && hi[3] < 0.0)) return false;
+
+    // Gaps over rates in the first two lanes: `ratio` of polygon_exact.cpp, and Ziv's test as in
+    // `round_enclosed`, both for numbers above zero.
+    const auto rates = [](const Lanes& z) __attribute__((always_inline)) {
+        return Lanes(__builtin_shufflevector(z.v, z.v, 2, 3, 2, 3));
+    };
+    const Lanes d = rates(n.hi), d_rest = rates(n.lo), d_error = rates(n_error);
+    const LaneMask safe = (Lanes(kSmallestSafe) < magnitude(n.hi)) & (magnitude(n.hi) < Lanes(kLargestSafe)) &
+                          (d_error < Lanes(kSmallRelative) * magnitude(d));
+    if (!all(safe)) return false;
+    const Lanes inverse = Lanes(1.0) / d, rough = n.hi * inverse, product = rough * d;
+    const Lanes rest =
+        ((n.hi - product) - Arithmetic::product_error(rough, d, product)) + (n.lo - rough * d_rest);
+    const WideLanes t = in_order(rough, rest * inverse);
+    const Lanes inherited =
+        (n_error + t.hi * d_error) * magnitude(inverse) * Lanes(1.0 + 2.0 * kSmallRelative);
+    const Lanes error = (inherited + Lanes(kInverseError) * t.hi) * Lanes(kBoundRounding);
+    const Lanes size = magnitude(t.lo);
+    const LaneMask rounds = (error < size) & LaneMask((t.hi - (size + error)).v == t.hi.v);
+    if (rounds.v[0] == 0 || rounds.v[1] == 0) return false;
+    const LaneMask::Vector below = t.lo.v < 0.0;
+    const Lanes lower = neighbour(t.hi, below), upper = neighbour(lower, LaneMask::Vector{1, 1, 1, 1});
+    out.first = {t.hi[0], lower[0], upper[0]};
+    out.last = {t.hi[1], lower[1], upper[1]};
+
+    const auto ahead = [](const Lanes& p, const Lanes& q) __attribute__((always_inline)) {
+        return Lanes(__builtin_shufflevector(p.v, q.v, 0, 4, 0, 4));
+    };
+    const WideLanes normal{ahead(normal_x.hi, normal_y.hi), ahead(normal_x.lo, normal_y.lo)};
+    const Lanes length = magnitude(normal.hi);
+    if (!all(((Lanes(kSmallestSafe) < length) & (length < Lanes(kLargestSafe))) | (length <= Lanes(0.0)))) {
+        return false;
+    }
+    out.normal = direction_of<Arithmetic>(normal);
+    if (!place) return true;
+
+    // As `round_sum` of polygon_exact.cpp.
+    const Lanes from = twice(start.x, start.y), speed = twice(velocity.x, velocity.y);
+    const WideLanes way = product_of<Arithmetic>({t.hi[0], t.lo[0]}, {speed, 0.0});
+    const WideLanes end = sum_of(from, way.hi);
+    const Lanes end_rest = end.lo + way.lo;
+    const Lanes off = (magnitude(speed) * Lanes(error[0]) +
+                       Lanes(kWideRoundoff) * (magnitude(way.hi) + magnitude(end.hi))) *
+                          Lanes(kBoundRounding) +
+                      Lanes(kEnclosedUnderflow);
+    const Lanes found = end.hi + (end_rest - off);
+    out.place = {found[0], found[1]};
+    return all(LaneMask(found.v == (end.hi + (end_rest + off)).v));
+}
+
+GEOMSRV_FUSED bool find_moments_fused(const Facing& entry, const Facing& exit, Vec2 start, Vec2 velocity,
+                                      bool place, Moments& out) {
+    return find_moments<OneRounding>(entry, exit, start, velocity, place, out);
+}
+bool find_moments_plain(const Facing& entry, const Facing& exit, Vec2 start, Vec2 velocity, bool place,
+                        Moments& out) {
+    return find_moments<TwoRoundings>(entry, exit, start, velocity, place, out);
+}
+
+/// The answer where it is that simple; false if it is not, or in doubt.
+bool resolve_quickly(const Query& query, FirstContact& out, std::array<Vec2, 2>& points) {
+    const PolygonPair& pair = query.pair;
+    if (query.relation != Relation::apart || query.entries.size() != 1 || query.exits.size() != 1) {
+        return false;
+    }
+    const AxisOf entry = query.entries[0];
+    const AxisOf exit = query.exits[0];
+    if (entry.index >= pair.side(entry.side).edges || exit.index >= pair.side(exit.side).edges) {
+        return false;
+    }
+    const Level lowest = pair.lowest_level(entry);
+    if (query.contact_set && lowest.vertex != lowest.neighbour) {
+        return false;
+    }
+    const auto facing = [&](AxisOf axis, std::size_t vertex) {
+        const PairedPolygon& p = pair.side(axis.side);
+        const bool is_a = axis.side == 0;
+        return Facing{p.ring[axis.index], p.ring[p.next(axis.index)], pair.other(axis.side).ring[vertex],
+                      is_a ? query.velocity_a : query.velocity_b, is_a ? query.velocity_b : query.velocity_a};
+    };
+    const Facing first = facing(entry, lowest.vertex);
+    const auto find = has_fused() ? find_moments_fused : find_moments_plain;
+    Moments found;
+    if (!find(first, facing(exit, pair.lowest(exit)), first.lowest, first.other_velocity, query.contact_set,
+              found) ||
+        !(found.first.upper <= std::min(found.last.lower, query.t_max))) {
+        return false;
+    }
+    out.status = ContactStatus::will_touch;
+    out.time = found.first.nearest;
+    out.time_lower = found.first.lower;
+    out.time_upper = found.first.upper;
+    out.last_time = std::min(found.last.nearest, query.t_max);
+    out.normal = entry.side == 0 ? found.normal : -found.normal;
+    if (query.contact_set) {
+        points[0] = found.place;
+        out.points = {points.data(), 1};
+    }
+    return true;
+}
+
 }  // namespace
 
 ExactFirstContactSolver::ExactFirstContactSolver(std::size_t largest_a, std::size_t largest_b)
@@ -373,8 +558,12 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
     query.entries = {entries_.data(), candidates.entries};
     query.exits = {exits_.data(), candidates.exits};
 
-    FirstContact result;
+    FirstContact result = kNever;
     const bool in_range = pair_.scale_exponent() == 0 && motion.scale_exponent == 0;
+    result.rung = Rung::wide;
+    if (in_range && resolve_quickly(query, result, points_)) {
+        return result;
+    }
     const Rung rung = climb(in_range, [&](auto arithmetic) {
         result = kNever;
         return Resolution<decltype(arithmetic)>(query, result, points_).run();

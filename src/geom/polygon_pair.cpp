@@ -155,54 +155,9 @@ bool append_tips(PairedPolygon& p) {
     return true;
 }
 
-/// Blocks of axes of p projected on all vertices of q; several blocks share the loads of the vertices.
-template <std::size_t Blocks>
-GEOMSRV_INLINE void project_blocks(const PairedPolygon& p, const PairedPolygon& q, std::size_t first) {
-    std::array<Lanes, Blocks> dx;
-    std::array<Lanes, Blocks> dy;
-    std::array<Lanes, Blocks> low;
-    for (std::size_t i = 0; i < Blocks; ++i) {
-        dx[i] = Lanes::load(p.dx + first + i * kLanes);
-        dy[i] = Lanes::load(p.dy + first + i * kLanes);
-        low[i] = kInfinity;
-    }
-    for (std::size_t j = 0; j < q.ring.size(); ++j) {
-        const Lanes x = q.x[j];
-        const Lanes y = q.y[j];
-        for (std::size_t i = 0; i < Blocks; ++i) {
-            low[i] = lesser(dx[i] * x + dy[i] * y, low[i]);
-        }
-    }
-    for (std::size_t i = 0; i < Blocks; ++i) {
-        const std::size_t k = first + i * kLanes;
-        (low[i] - (dx[i] * Lanes::load(p.x + k) + dy[i] * Lanes::load(p.y + k))).store(p.gap + k);
-    }
-}
-
-GEOMSRV_INLINE void project_all(const PairedPolygon& p, const PairedPolygon& q) {
-    const std::size_t end = padded(p.axes);
-    std::size_t k = 0;
-    for (; k + 4 * kLanes <= end; k += 4 * kLanes) {
-        project_blocks<4>(p, q, k);
-    }
-    switch ((end - k) / kLanes) {
-        case 3:
-            project_blocks<3>(p, q, k);
-            break;
-        case 2:
-            project_blocks<2>(p, q, k);
-            break;
-        case 1:
-            project_blocks<1>(p, q, k);
-            break;
-        default:
-            break;
-    }
-}
-
 GEOMSRV_WIDE_CLONES void project_all_of_both(const PairedPolygon& a, const PairedPolygon& b) {
-    project_all(a, b);
-    project_all(b, a);
+    project_all<double>(a, b);
+    project_all<double>(b, a);
 }
 
 /// One of the vertices that are lowest, up to rounding.  Without branches: which is lowest cannot be
@@ -271,9 +226,9 @@ Chain extend_level(const PairedPolygon& q, Vec2 axis, Chain chain, std::size_t l
 }  // namespace
 
 PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
-    // Room for the ring to go on past its end, for tips, and for whole blocks of lanes.
-    const std::array<std::size_t, 2> lengths = {padded(largest_a + 2 * kLanes),
-                                                padded(largest_b + 2 * kLanes)};
+    // Room for the ring to go on past its end, for tips, and for whole blocks of lanes, two at a time.
+    const std::array<std::size_t, 2> lengths = {padded(largest_a + 3 * kLanes),
+                                                padded(largest_b + 3 * kLanes)};
     constexpr std::size_t kArrays = 8;
     around_.resize(lengths[0] + lengths[1]);
     storage_.resize(kArrays * (lengths[0] + lengths[1]));
@@ -291,16 +246,23 @@ PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
 }
 
 void PolygonPair::load(Ring a, Ring b) {
-    if (!place(a, b, false)) {
-        place(hulls_[0].of(a), hulls_[1].of(b), true);
-    }
+    place(a, b);
     project();
 }
 
-bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
+void PolygonPair::place(Ring a, Ring b) {
+    if (!try_place(a, b, false)) {
+        try_place(hulls_[0].of(a), hulls_[1].of(b), true);
+    }
+    gap_error_ = kGapError * kUnitRoundoff * reach_;
+}
+
+bool PolygonPair::try_place(Ring a, Ring b, bool known_strict) {
     auto& [first, second] = sides_;
     first.ring = a;
     second.ring = b;
+    first.vertices = a.size();
+    second.vertices = b.size();
     const Vec2 origin = a[0];
     copy_around(first);
     copy_around(second);
@@ -356,19 +318,23 @@ bool PolygonPair::place(Ring a, Ring b, bool known_strict) {
     return true;
 }
 
+bool PolygonPair::walks() const {
+    const auto& [a, b] = sides_;
+    return a.edges > 2 && b.edges > 2 && a.edges * b.edges > kLargestProduct;
+}
+
 void PolygonPair::project() {
     const auto& [a, b] = sides_;
-    const bool walk = a.edges > 2 && b.edges > 2 && a.edges * b.edges > kLargestProduct;
-    if (walk) {
+    if (walks()) {
         project_by_walking(a, b);
         project_by_walking(b, a);
+        gap_error_ = (kGapError + kWalkError) * kUnitRoundoff * reach_;
     } else {
         project_all_of_both(a, b);
     }
     for (const PairedPolygon& p : sides_) {
         std::fill_n(p.gap + p.axes, kLanes - 1, -1.0);
     }
-    gap_error_ = (walk ? kGapError + kWalkError : kGapError) * kUnitRoundoff * reach_;
 }
 
 Vec2 PolygonPair::moved(Vec2 from, DoubleDouble x, DoubleDouble y) const {

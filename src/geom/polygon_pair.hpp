@@ -31,6 +31,7 @@
 #include "geom/enclosed.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/polygon.hpp"
+#include "geom/polygon_projection.hpp"
 #include "geom/vec.hpp"
 
 namespace geomsrv {
@@ -49,19 +50,13 @@ inline constexpr double kWalkError = 40.0;
 /// Below 2^-1022 results are rounded to multiples of 2^-1074; no bound here counts more than 16 of them.
 inline constexpr double kPairUnderflow = 0x1p-1070;
 
-/// One polygon of a pair.  Arrays have room for `axes` rounded up to whole lanes.
-struct PairedPolygon {
-    Ring ring;              ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
-    std::size_t edges = 0;  ///< 0 for a point, 2 for a segment
-    std::size_t axes = 0;   ///< edges, then tips
+/// One polygon of a pair: vertices relative to the origin of the pair, and edges, times its scale; gaps are
+/// -1 beyond the last axis.
+struct PairedPolygon : ProjectedPolygon<double> {
+    Ring ring;  ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
     std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis
     Vec2* around = nullptr;            ///< the ring, going on past its end
-    double* x = nullptr;  ///< vertices relative to the origin of the pair, times its scale; then the tips'
-    double* y = nullptr;
-    double* dx = nullptr;  ///< outward axes times the scale; zero beyond `axes`
-    double* dy = nullptr;
-    double* gap = nullptr;          ///< support of the other polygon minus own; -1 beyond `axes`
-    std::array<double*, 3> work{};  ///< for the query
+    std::array<double*, 3> work{};     ///< for the query
 
     /// First of the vertices on which the axis rests: its edge's, or the tip.
     [[nodiscard]] std::size_t base(std::size_t axis) const { return axis < edges ? axis : tip[axis - edges]; }
@@ -147,6 +142,13 @@ public:
 
     /// Takes up two valid rings; they must outlive their use.
     void load(Ring a, Ring b);
+    /// The same without gaps.
+    void place(Ring a, Ring b);
+    /// Finds the gaps of what has been placed.
+    void project();
+    /// Whether that takes a walk round the polygons, which are too large to project every axis on every
+    /// vertex.
+    [[nodiscard]] bool walks() const;
 
     [[nodiscard]] const PairedPolygon& side(int i) const { return sides_[static_cast<std::size_t>(i)]; }
     [[nodiscard]] const PairedPolygon& other(int i) const { return sides_[static_cast<std::size_t>(1 - i)]; }
@@ -202,8 +204,7 @@ public:
     [[nodiscard]] int sign_of_gap(AxisOf axis, std::size_t vertex) const;
 
 private:
-    bool place(Ring a, Ring b, bool known_strict);
-    void project();
+    bool try_place(Ring a, Ring b, bool known_strict);
     [[nodiscard]] int sign_of_height(AxisOf axis, Vec2 from, Vec2 to) const;
 
     std::array<PairedPolygon, 2> sides_;

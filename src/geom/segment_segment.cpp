@@ -28,10 +28,11 @@ double nearest_parameter(double along, double squared) {
 // down to noise near parallel directions.  Clamping s, then t, then s again is exact unless the directions
 // are so nearly parallel that s is noise; the certificate then fails and the nearest of the four end points
 // is tried, and if that is not it either, the general method.
-CoreSeparation segment_segment(const Core& a, const Core& b) {
-    const Vec3 g = a.generator[0];
-    const Vec3 h = b.generator[0];
-    const Vec3 middle = b.center - a.center;
+template <class Body>
+CoreSeparation segment_segment(const Body& a, const Body& b) {
+    const Vec3 g = widened(a.generator[0]);
+    const Vec3 h = widened(b.generator[0]);
+    const Vec3 middle = widened(b.center) - widened(a.center);
     const double gg = dot(g, g);
     const double hh = dot(h, h);
     const double gh = dot(g, h);
@@ -56,7 +57,8 @@ CoreSeparation segment_segment(const Core& a, const Core& b) {
         const Vec3 normal = !meet               ? normalized(gap)
                             : determinant > 0.0 ? normalized(across)
                                                 : perpendicular(gg > hh ? g : h);
-        CoreSeparation out = certify_apart(a, b, normal, a.center + p.s * g, b.center + p.t * h);
+        CoreSeparation out =
+            certify_apart(a, b, normal, widened(a.center) + p.s * g, widened(b.center) + p.t * h);
         out.stage = Stage::closed_form;
         return out;
     };
@@ -80,5 +82,8 @@ CoreSeparation segment_segment(const Core& a, const Core& b) {
     }
     return best.converged ? best : convex_convex(a, b, true);
 }
+
+template CoreSeparation segment_segment(const Core&, const Core&);
+template CoreSeparation segment_segment(const SingleCore&, const SingleCore&);
 
 }  // namespace geomsrv

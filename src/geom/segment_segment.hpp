@@ -7,6 +7,7 @@
 
 namespace geomsrv {
 
-CoreSeparation segment_segment(const Core& a, const Core& b);
+template <class Body>
+CoreSeparation segment_segment(const Body& a, const Body& b);
 
 }  // namespace geomsrv

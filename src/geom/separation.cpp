@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geom/single_core.hpp"
+
 namespace geomsrv {
 
 namespace {
@@ -18,23 +20,28 @@ struct Bounds {
 };
 
 /// What the direction proves, and what the points prove if they are members of the cores.
-Bounds bounds_of(const Core& a, const Core& b, Vec3 normal, double length) {
+template <class Body>
+Bounds bounds_of(const Body& a, const Body& b, Vec3 normal, double length) {
     const double gap = lowest(b, normal).value - highest(a, normal).value;
     const double size = a.reach + b.reach;
     const double error = a.error + b.error;
-    return {gap, gap - (kGapError * size + kGapScale * std::abs(gap) + error),
-            length + (kMemberError * size + kGapScale * length + error), size, error};
+    const auto rounding = [size](double counted, double value) {
+        return Body::kCoarseness * (counted * size + kGapScale * value);
+    };
+    return {gap, gap - (rounding(kGapError, std::abs(gap)) + error),
+            length + (rounding(kMemberError, length) + error), size, error};
 }
 
 /// What the caller's numbers leave open is no failure to converge.
-Outcome judge(double lower, double upper, const Bounds& bounds) {
-    return upper - lower <= kPromisedWidth * bounds.size + 3 * bounds.error ? Outcome::ok
-                                                                            : Outcome::not_converged;
+Outcome judge(double lower, double upper, const Bounds& bounds, double coarseness) {
+    const double promised = coarseness * kPromisedWidth * bounds.size + 3 * bounds.error;
+    return upper - lower <= promised ? Outcome::ok : Outcome::not_converged;
 }
 
 }  // namespace
 
-CoreSeparation certify_apart(const Core& a, const Core& b, Vec3 normal, Vec3 point_a, Vec3 point_b) {
+template <class Body>
+CoreSeparation certify_apart(const Body& a, const Body& b, Vec3 normal, Vec3 point_a, Vec3 point_b) {
     const double length = norm(point_b - point_a);
     const Bounds bounds = bounds_of(a, b, normal, length);
     CoreSeparation out;
@@ -45,12 +52,13 @@ CoreSeparation certify_apart(const Core& a, const Core& b, Vec3 normal, Vec3 poi
     out.point_a = point_a;
     out.point_b = point_b;
     out.normal = normal;
-    out.converged = length - bounds.gap <= kMeetingGap * bounds.size;
-    out.outcome = judge(out.lower, out.upper, bounds);
+    out.converged = length - bounds.gap <= Body::kCoarseness * kMeetingGap * bounds.size;
+    out.outcome = judge(out.lower, out.upper, bounds, Body::kCoarseness);
     return out;
 }
 
-CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 point_a, Vec3 point_b,
+template <class Body>
+CoreSeparation certify_deep(const Body& a, const Body& b, Vec3 normal, Vec3 point_a, Vec3 point_b,
                             double upper) {
     const Bounds bounds = bounds_of(a, b, normal, 0.0);
     CoreSeparation out;
@@ -63,9 +71,26 @@ CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 poin
     out.point_a = point_a;
     out.point_b = point_b;
     out.normal = normal;
-    out.converged = upper - bounds.gap <= kDeepMeetingGap * bounds.size;
-    out.outcome = judge(out.lower, out.upper, bounds);
+    out.converged = upper - bounds.gap <= Body::kCoarseness * kDeepMeetingGap * bounds.size;
+    out.outcome = judge(out.lower, out.upper, bounds, Body::kCoarseness);
     return out;
+}
+
+template CoreSeparation certify_apart(const Core&, const Core&, Vec3, Vec3, Vec3);
+template CoreSeparation certify_apart(const SingleCore&, const SingleCore&, Vec3, Vec3, Vec3);
+template CoreSeparation certify_deep(const Core&, const Core&, Vec3, Vec3, Vec3, double);
+template CoreSeparation certify_deep(const SingleCore&, const SingleCore&, Vec3, Vec3, Vec3, double);
+
+void unscale(CoreSeparation& s, double scale) {
+    if (scale == 1.0) {
+        return;
+    }
+    const double unit = 1.0 / scale;
+    s.value *= unit;
+    s.lower = next_down(s.lower * unit);
+    s.upper = next_up(s.upper * unit);
+    s.point_a = unit * s.point_a;
+    s.point_b = unit * s.point_b;
 }
 
 Vec3 perpendicular(Vec3 v) {

@@ -113,13 +113,20 @@ inline constexpr double kDeepMeetingGap = 3 * kMeetingGap;
 // u).  The errors of the vertices themselves come on top.
 inline constexpr double kPromisedWidth = 80 * kUnitRoundoff;
 
-/// Bounds from a direction and a pair of points of the cores.
-CoreSeparation certify_apart(const Core& a, const Core& b, Vec3 normal, Vec3 point_a, Vec3 point_b);
+/// Bounds from a direction and a pair of points of the cores.  `Body`: Core, or SingleCore, of which all
+/// errors count kCoarseness times.
+template <class Body>
+CoreSeparation certify_apart(const Body& a, const Body& b, Vec3 normal, Vec3 point_a, Vec3 point_b);
 
 /// Bounds of overlapping cores from a direction and a proof that no other does better: `upper` >= s for the
 /// vertices as stored.  The points are deepest points.
-CoreSeparation certify_deep(const Core& a, const Core& b, Vec3 normal, Vec3 point_a, Vec3 point_b,
+template <class Body>
+CoreSeparation certify_deep(const Body& a, const Body& b, Vec3 normal, Vec3 point_a, Vec3 point_b,
                             double upper);
+
+/// Back to the caller's unit, from one in which lengths are `scale` times as long.  Only a result below the
+/// normal range rounds: then away from the value.
+void unscale(CoreSeparation& s, double scale);
 
 /// A unit vector perpendicular to v; any unit vector if v is 0.
 Vec3 perpendicular(Vec3 v);

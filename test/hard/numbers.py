@@ -44,12 +44,16 @@ def permuted(rng: Random) -> Frame:
     return [[x * s for x in row] for row, s in zip(rows, (sign(rng), sign(rng), sign(rng)), strict=True)]
 
 
+# A quaternion is drawn again if its square is less: of the rest none is near the zero that has no direction.
+LEAST_SQUARE = 1e-3
+
+
 def rotated(rng: Random) -> Frame:
     """A random rotation, rounded."""
     while True:
         w, x, y, z = (rng.gauss(0.0, 1.0) for _ in range(4))
         n = w * w + x * x + y * y + z * z
-        if n > 1e-3:
+        if n > LEAST_SQUARE:
             break
     return [
         [(w * w + x * x - y * y - z * z) / n, 2 * (x * y - w * z) / n, 2 * (x * z + w * y) / n],
