@@ -679,12 +679,11 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
                                                      : TurningStatus::grazing;
                 out.lower = next;
                 out.upper = upper;
-                Look then;
-                then.t = next;
-                place(then);
-                a_.body.place(next);
-                b_.body.place(next);
-                const Witness& w = used;
+                const Vec3 predicted = unit_or(direction.normal + step * direction.change, direction.normal);
+                const Look then = look(next, predicted);
+                const bool seen = then.found.state == GjkState::apart && then.found.gap > 0.0;
+                // Where the bodies are too close to be told apart in doubles, what was seen last.
+                const Witness& w = seen ? then.found.witness : used;
                 Vec3 middle;
                 for (int i = 0; i < w.count; ++i) {
                     const Vec3 p = a_.body.placed(static_cast<std::size_t>(w.a[i]));
@@ -692,7 +691,7 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
                     middle = middle + (0.5 * w.weight[i]) * (p + q);
                 }
                 out.point = in_world(middle, next);
-                out.normal = unit_or(direction.normal + step * direction.change, direction.normal);
+                out.normal = seen ? then.found.normal : predicted;
                 return out;
             }
         }
