@@ -144,6 +144,13 @@ def first_contact(s: Stream, tier: str, share: int) -> Answers:
     yield gs.first_contact(s.rings(count), s.rings(count), *velocities, t_max=32.0, accuracy=tier)
 
 
+def solid_motions(s: Stream, tier: str, share: int) -> Answers:
+    count = 2500 // share
+    for side_a, side_b in ((s.boxes, s.boxes), (s.boxes, s.hulls), (s.hulls, s.hulls)):
+        velocities = s.reals(-2, 2, 2, count, 3, bits=3)
+        yield gs.first_contact(side_a(count), side_b(count), *velocities, t_max=32.0, accuracy=tier)
+
+
 def boxes(s: Stream, tier: str, share: int) -> Answers:
     a, b = s.boxes(10000 // share), s.boxes(10000 // share)
     yield gs.distance(a, b, accuracy=tier, want=("penetration",))
@@ -184,13 +191,13 @@ def shapes(s: Stream, tier: str, share: int) -> Answers:
 
 QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
     query.__name__: query
-    for query in (cull, to_frustum, to_frustum_2d, polygons, first_contact, boxes, hulls, mixed, shapes)
+    for query in (cull, to_frustum, to_frustum_2d, polygons, first_contact, solid_motions, boxes, hulls, mixed, shapes)
 }
 
 
 # -------------------------------------------------------------------------------------------------------- hashing
 
-LAZY = {"_point_a": "point_a", "_normal": "normal"}  #: found on first use
+LAZY = {"_point_a": "point_a", "_normal": "normal", "_closing_speed": "closing_speed"}  #: found on first use
 
 
 def content(answer: Any) -> Iterator[tuple[str, NDArray[Any]]]:
