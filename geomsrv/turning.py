@@ -112,7 +112,8 @@ def _closing_speed(
         return linear + np.cross(angular, point - (center + moment[:, None] * linear))
 
     with np.errstate(over="ignore", invalid="ignore"):
-        speed: FloatArray = ((velocity(motion_a) - velocity(motion_b)) * normal).sum(axis=1)
+        x, y, z = ((velocity(motion_a) - velocity(motion_b)) * normal).T
+        speed: FloatArray = x + y + z  # in this order everywhere
     return speed
 
 
