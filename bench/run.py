@@ -67,6 +67,8 @@ def declare(quick: bool) -> list[Scenario]:
     _, points = scenarios.points_around_frustum(1_000_000 // cut)
     a, b, velocity_a, velocity_b = scenarios.moving_polygons(100_000 // cut)
     hits = float(np.mean(gs.first_contact(a, b, velocity_a, velocity_b).status == gs.WILL_TOUCH))
+    box_a, box_b, turning = scenarios.turning_boxes(20_000 // cut)
+    turning_hits = float(np.mean(gs.first_contact(box_a, box_b, **turning, t_max=5.0).status == gs.WILL_TOUCH))
     few = 1000
     single_boxes = [gs.Box(h) for h in boxes.half_extents[:few]]
     box_poses = scenarios.relative_poses(few, 0.5, 8.0)
@@ -97,6 +99,11 @@ def declare(quick: bool) -> list[Scenario]:
             (lambda: baselines.numpy_first_contact(a, b, velocity_a, velocity_b), len(a)),
         ),
         Scenario("polygon distance 4-16", None, (lambda: gs.distance(a, b), len(a))),
+        Scenario(
+            f"first contact, turning boxes to 1 us, {turning_hits:.0%} hits",
+            10_000.0,
+            (lambda: gs.first_contact(box_a, box_b, **turning, t_max=5.0), len(box_a)),
+        ),
     ]
     for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
         given = moving(100_000 // cut)

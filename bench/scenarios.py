@@ -68,6 +68,24 @@ def moving_polygons(n: int = 100_000) -> tuple[gs.Polygons, gs.Polygons, np.ndar
     return batch(np.zeros((n, 2))), batch(center_b), rng.normal(scale=0.1, size=(n, 2)), velocity_b
 
 
+def turning_boxes(n: int = 20_000) -> tuple[gs.Boxes, gs.Boxes, dict[str, np.ndarray]]:
+    """Boxes of 0.2 to 2 m a few metres apart, on their way towards each other at some m/s, turning by some rad/s."""
+    rng = np.random.default_rng(SEED)
+
+    def batch(center: np.ndarray) -> gs.Boxes:
+        return gs.Boxes(center, random_rotations(rng, n), rng.uniform(0.1, 1.0, (n, 3)))
+
+    center_b = rng.normal(size=(n, 3))
+    center_b *= rng.uniform(2.0, 6.0, (n, 1)) / np.linalg.norm(center_b, axis=1, keepdims=True)
+    motion = {
+        "velocity_a": rng.normal(scale=0.2, size=(n, 3)),
+        "velocity_b": -rng.uniform(0.5, 2.0, (n, 1)) * center_b + rng.normal(scale=0.5, size=(n, 3)),
+        "angular_velocity_a": rng.normal(scale=2.0, size=(n, 3)),
+        "angular_velocity_b": rng.normal(scale=2.0, size=(n, 3)),
+    }
+    return batch(np.zeros((n, 3))), batch(center_b), motion
+
+
 Moving = tuple[gs.Boxes | gs.Polytopes, gs.Boxes | gs.Polytopes, np.ndarray, np.ndarray]
 
 

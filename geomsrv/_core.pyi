@@ -48,6 +48,15 @@ def first_contact_polygons(
     contact_set: bool,
     accuracy: str = "float64",
 ) -> tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _Rungs]: ...
+def first_contact_turning(
+    a: tuple[_F | _I, ...],
+    b: tuple[_F | _I, ...],
+    motion_a: _F,
+    motion_b: _F,
+    t_max: float,
+    tolerance: float,
+    slack: _F,
+) -> tuple[_U, _F, _F, _F, _F, _B, _I]: ...
 def first_contact_world(
     a: tuple[_F | _I, ...],
     b: tuple[_F | _I, ...],

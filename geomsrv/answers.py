@@ -55,6 +55,7 @@ class ContactStatus(IntEnum):
     OVERLAPPING = 3  #: in contact at t = 0 with depth > 0; so is a point or a segment inside a body
     UNSUPPORTED = 4  #: no kernel for this pair or motion; every number is NaN
     NOT_CONVERGED = 5  #: the work budget ran out; ``time_lower`` and ``time_upper`` bracket the answer
+    GRAZING = 6  #: apart until ``time``; there, neither contact nor its absence could be proven
 
 
 class DistanceStatus(IntEnum):
@@ -269,9 +270,10 @@ class FirstContacts(_Certified):
     status : (n,) uint8
         `ContactStatus`.
     time, time_lower, time_upper : (n,) float64
-        First contact [s] and a proven interval; 0 if in contact at the start, NaN for NEVER and UNSUPPORTED.
+        First contact [s] and a proven interval, up to inf where contact is not proven; 0 if in contact at the start,
+        NaN for NEVER and UNSUPPORTED.
     last_time : (n,) float64
-        Last contact [s], at most ``t_max``; inf if they never part, NaN for NEVER and UNSUPPORTED.
+        Last contact [s], at most ``t_max``; inf if they never part, NaN for NEVER, UNSUPPORTED and bodies that turn.
     normal : (n, d) float64
         Unit contact normal from a to b at ``time``; NaN where there is none.
     points : (k, d) float64, point_offsets : (n + 1,) int64

@@ -21,6 +21,7 @@ from geomsrv.crosscheck import CrossCheck
 from geomsrv.pairwise import ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
+from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.world import World
 
 __all__ = ["Engine", "Evaluation", "SceneContacts", "Stage"]
@@ -138,6 +139,12 @@ class Engine:
 
     # ---------------------------------------------------------------------------------------------------- the plan
 
+    @property
+    def turning_count(self) -> int:
+        """Number of objects that turn and can be followed while they do."""
+        world = self.scene.world
+        return int((world.turns & followed_in_turning(world)).sum())
+
     def plan(self, asked: frozenset[str]) -> list[Stage]:
         """Which effects an evaluation runs, and why.
 
@@ -169,6 +176,14 @@ class Engine:
                 (not config.effects_first_contact, "switched off by effects.first_contact"),
                 (config.horizon == 0.0, "the horizon is 0"),
                 (self.moving_count == 0, "nothing moves"),
+            ),
+            _stage(
+                "rotation",
+                *contact,
+                (not config.effects_first_contact, "switched off by effects.first_contact"),
+                (config.horizon == 0.0, "the horizon is 0"),
+                (self.turning_count == 0, "nothing turns"),
+                (config.accuracy != "float64", f"turning objects are followed at float64, not at {config.accuracy}"),
             ),
             _stage("contact_set", *contact, (not config.effects_contact_set, "switched off by effects.contact_set")),
             _stage(
@@ -238,6 +253,7 @@ class Engine:
         # If nothing moves the scene sweeps nothing, and the present holds until the horizon.
         horizon = self.config.horizon if self.config.effects_first_contact else 0.0
         self.counters["first_contact"] += "first_contact" in on
+        self.counters["rotation"] += "rotation" in on
         pairs = self.scene.first_contacts(horizon, accuracy=self.config.accuracy)
         if "contact_set" in on:
             self.counters["contact_set"] += 1

@@ -23,7 +23,6 @@ from geomsrv.narrow_phase import (
     DistanceRows,
     Unsupported,
     count_kinds,
-    first_contact_rows,
     placed_distances,
     polygon_contacts,
     polygon_distances,
@@ -32,6 +31,7 @@ from geomsrv.narrow_phase import (
 from geomsrv.placement import laid_flat
 from geomsrv.queries import RUNGS, TIERS
 from geomsrv.shapes import Frustum, Shape
+from geomsrv.turning_pairs import contact_rows
 from geomsrv.world import ShapeTable, World
 
 __all__ = [
@@ -310,7 +310,7 @@ def listed_first_contacts(
     if _all_slide(world, pairs):
         return _sliding_polygons(world, pairs, end, tier, start)
     listed = _Listed(world, pairs)
-    rows, unsupported = first_contact_rows(world, listed.comparable, end, tier, counts)
+    rows, unsupported = contact_rows(world, listed.comparable, end, tier, counts)
     at = listed.rows_among(rows.pairs)
     # A pair without a row never touches, or could not be compared at all.
     status = _take(rows.status, at, ContactStatus.NEVER)

@@ -34,6 +34,7 @@ from geomsrv.shapes import (
     Sphere,
     pack,
 )
+from geomsrv.turning import first_contact_turning, turns
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -206,15 +207,20 @@ def first_contact(
     accuracy: str = "float64",
     contact_set: bool = True,
     certificates: bool = False,
+    angular_velocity_a: ArrayLike | None = None,
+    angular_velocity_b: ArrayLike | None = None,
+    center_a: ArrayLike | None = None,
+    center_b: ArrayLike | None = None,
+    tolerance: float = 1e-6,
 ) -> FirstContacts:
-    """When and where translating convex bodies first touch.
+    """When and where convex bodies first touch that translate, or translate and turn.
 
     Parameters
     ----------
     a, b : Polygons (2D), Polytopes or Boxes (3D)
         n against n, or one against n.
     velocity_a, velocity_b : (n, d) or (d,) float
-        Constant linear velocities [m/s], world frame.
+        Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
@@ -228,13 +234,29 @@ def first_contact(
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
-        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+        Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".  Not for bodies
+        that turn.
+    angular_velocity_a, angular_velocity_b : (n, 3) or (3,) float; in 2D (n,) or one number; optional
+        Constant angular velocities [rad/s], world frame.  If any is not zero, a point that is at x0 at the start moves
+        as ``x(t) = c + v t + R(w t) (x0 - c)``, and the only tier is "float64", whose bounds are proven.
+    center_a, center_b : (n, d) or (d,) float, optional
+        The points c at the start [m], which the bodies turn about.  By default the centre of a box, and otherwise the
+        middle of the bounding box, ``0.5 * min + 0.5 * max`` of the vertices in float64.
+    tolerance : float
+        Widest time interval of WILL_TOUCH for bodies that turn [s], > 0; neighbouring doubles always do.
 
     Returns
     -------
     FirstContacts
         ``cost.counts``: polygons by the tier's rungs; solids decided by the "filter" in float64, in "wide" arithmetic
         (double-double) and in "exact" arithmetic, which "float64", too, turns to where bodies pass within the slack.
+
+        If anything turns, ``time`` is ``time_lower``: the bodies are proven apart before it, and proven in contact at
+        some time until ``time_upper``.  ``normal``, ``closing_speed``, and one contact point midway between the nearest
+        points, are those at ``time``; ``last_time`` is NaN.  TOUCHING, at the start, and GRAZING are outcomes where
+        neither can be proven, with a ``time_upper`` that may be inf; NOT_CONVERGED is one where the work allowed did
+        not get beyond ``time_lower``, as for two bodies that turn beside each other for ever.  ``cost.counts``: pairs
+        decided in "filter" and "wide" arithmetic, and how many "looks" at them it took.
 
     Raises
     ------
@@ -244,7 +266,8 @@ def first_contact(
     References
     ----------
     Book sections 7.7 and 11.11 for the times; the contact set is derived from support features, because the printed
-    labels fail on rotated shapes.
+    labels fail on rotated shapes.  Bodies that turn: conservative advancement (Mirtich, 1996), along a direction that
+    turns, too.
 
     Examples
     --------
@@ -254,6 +277,11 @@ def first_contact(
     >>> hit = gs.first_contact(square, other, (1.0, 0.0), (0.0, 0.0))
     >>> hit.time, hit.last_time, hit.normal, hit.points.tolist()
     (array([2.]), array([4.]), array([[1., 0.]]), [[3.0, 0.5], [3.0, 1.0]])
+    >>> rod = gs.Polygons.from_list([[(-1, 0), (1, 0)]])
+    >>> wall = gs.Polygons.from_list([[(-2, 0.5), (2, 0.5)]])
+    >>> swing = gs.first_contact(rod, wall, (0, 0), (0, 0), angular_velocity_a=1.0)
+    >>> float(swing.time[0].round(6)), swing.points.round(6).tolist()
+    (0.523599, [[0.866025, 0.5]])
 
     In space boxes and hulls may be mixed:
 
@@ -264,6 +292,18 @@ def first_contact(
     (array([2.]), [[1.0, 0.0, 0.0]], array([2.]), [[3.0, 0.5, 0.0]])
     """
     start = time.perf_counter_ns()
+    if turns(angular_velocity_a, angular_velocity_b):
+        return first_contact_turning(
+            (a, b),
+            (velocity_a, velocity_b),
+            (angular_velocity_a, angular_velocity_b),
+            (center_a, center_b),
+            t_max=t_max,
+            tolerance=tolerance,
+            accuracy=accuracy,
+            contact_set=contact_set,
+            certificates=certificates,
+        )
     _expect(a, (Polygons, Polytopes, Boxes), "a")
     _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
     count = _common_length(len(a), len(b))

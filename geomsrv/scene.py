@@ -24,12 +24,13 @@ from geomsrv import _validate
 from geomsrv.answers import BoolArray, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
 from geomsrv.errors import GeometryError, SceneError
-from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, first_contact_rows
+from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
 from geomsrv.queries import TIERS
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
+from geomsrv.turning_pairs import contact_rows
 from geomsrv.visibility import Visibility, sight
 from geomsrv.world import ShapeTable, World
 
@@ -533,9 +534,11 @@ class Scene:
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
-        Polygons, boxes and hulls in pure translation are followed; pairs at rest relative to each other touch now or
+        Polygons, boxes and hulls in pure translation are followed, and polygons, boxes, hulls, spheres and capsules
+        where one of a pair turns, about the origin of its pose; pairs at rest relative to each other touch now or
         never; any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier
-        "bound" a row means that the pair may touch, TOUCHING that it may already.
+        "bound" a row means that the pair may touch, TOUCHING that it may already; objects that turn are followed at
+        "float64" only.
 
         Parameters
         ----------
@@ -560,7 +563,7 @@ class Scene:
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_swept(world, limit), 0.0, selection, counts)
-        rows, unsupported = first_contact_rows(world, pairs, limit, tier, counts)
+        rows, unsupported = contact_rows(world, pairs, limit, tier, counts)
         counts["unsupported"] += len(unsupported.pairs)
         sets = [points for points in rows.points if points is not None]
         sizes = [0 if points is None else len(points) for points in rows.points]

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from geomsrv.narrow_phase import followed_solids
+from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.visibility import boxed_kinds
 from geomsrv.world import World, supported_kinds
 
@@ -56,12 +57,14 @@ def _first_contacts(world: World) -> list[str]:
     ]
     if followed:
         lines.append(f"- followed in translation: {', '.join(followed)}")
-    turning = int(world.turns[polygons].sum())
-    if turning:
-        lines.append(
-            f"- unsupported unless in contact now: {_count(turning, 'polygon')} that turn or move unpredictably"
-        )
-    strange = int((moving & ~(known & sliding))[solids].sum())
+    spinning = followed_in_turning(world)
+    if turning := int((world.turns & spinning).sum()):
+        lines.append(f"- followed while they turn, at tier float64: {_count(turning, 'object')}")
+    elif not world.turns.any():
+        lines.append("- rotation: skipped, nothing turns")
+    if lost := int((world.turns & ~spinning)[polygons].sum()):
+        lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
+    strange = int((moving & ~(known & sliding) & ~(spinning & world.turns))[solids].sum())
     if strange:
         lines.append(
             f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "

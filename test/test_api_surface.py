@@ -50,7 +50,8 @@ Polygon(vertices)
 cull(frustum, boxes, *, accuracy='float64', certificates=False)
 distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False)
 first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', contact_set=True,
-    certificates=False)
+    certificates=False, angular_velocity_a=None, angular_velocity_b=None, center_a=None, center_b=None,
+    tolerance=1e-06)
 distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',),
     certificates=False)
 intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False)
@@ -258,7 +259,9 @@ def array_arguments(signature: str) -> list[np.ndarray]:
     return [np.zeros(shape, dtype) for (dtype, _), shape in zip(found, shapes, strict=True)]
 
 
-@pytest.mark.parametrize("name", [name for name in stub_functions() if "_world" not in name])
+@pytest.mark.parametrize(
+    "name", [name for name in stub_functions() if "_world" not in name and not name.endswith("_turning")]
+)
 def test_engine_refuses_what_it_would_have_to_copy(name: str) -> None:
     """Another dtype or layout means that the edge was bypassed: a TypeError, never a silent copy."""
     function = getattr(_core, name)

@@ -45,7 +45,7 @@ def active(engine, asked=EVERYTHING) -> set[str]:
 def test_everything_runs_when_asked_for() -> None:
     engine = make()
     stages = {stage.name: stage for stage in engine.plan(EVERYTHING)}
-    assert active(engine) == stages.keys() - {"cross_check"}
+    assert active(engine) == stages.keys() - {"cross_check", "rotation"}
     assert stages["cross_check"].reason == "cross_check.mode is off"
     answer = engine.evaluate(EVERYTHING)
     assert answer.contacts and answer.distances and answer.visible
@@ -80,6 +80,23 @@ def test_what_does_not_move_is_not_swept() -> None:
     answer = engine.evaluate(EVERYTHING).contacts
     assert engine.counters["first_contact"] == 0 and answer.horizon == engine.config.horizon
     assert answer.pairs.ids_a == ["ball"] and answer.pairs.last_time.tolist() == [engine.config.horizon]
+
+
+def test_what_does_not_turn_is_not_followed_in_turning() -> None:
+    engine = make()
+    (stage,) = [stage for stage in engine.plan(EVERYTHING) if stage.name == "rotation"]
+    assert (stage.active, stage.reason) == (False, "nothing turns")
+    engine.evaluate(EVERYTHING)
+    assert engine.counters["rotation"] == 0 < engine.counters["first_contact"]
+    spin = gs.SceneObject("spin", gs.Box((2.0, 0.1, 0.1)), (0, 0, 9, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1))
+    engine.apply(gs.SceneUpdate(add=[spin, gs.SceneObject("post", gs.Sphere(0.5), (0, 1.5, 9, 0, 0, 0, 1))]))
+    assert "rotation" in active(engine)
+    answer = engine.evaluate(EVERYTHING).contacts
+    assert engine.counters["rotation"] == 1 and ("post", "spin") in zip(
+        answer.pairs.ids_a, answer.pairs.ids_b, strict=True
+    )
+    off = make(first_contact=False)
+    assert "rotation" not in active(off)
 
 
 def test_no_camera_no_culling() -> None:

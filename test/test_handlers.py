@@ -213,8 +213,17 @@ def test_first_contact_inline_with_twists(desk) -> None:
     moving = desk.ask("FirstContact", **fields, twists_a=D([0.5, 0, 0, 0, 0, 0]), twists_b=D([-0.5, 0, 0, 0, 0, 0]))
     assert moving.time.tolist() == [2.0] and moving.status == OK
     turning = desk.ask("FirstContact", **fields, twists_a=D([0.5, 0, 0, 0, 0, 0.1]))
-    assert turning.status == UNSUPPORTED and "angular velocity" in turning.message
-    assert turning.item_status.tolist() == [4] and math.isnan(turning.time[0])
+    assert turning.status == OK and turning.item_status.tolist() == [1]
+    # It turns about its corner: the one ahead is at 0.5 t + cos(0.1 t).
+    t = turning.time[0]
+    assert 0.5 * t + math.cos(0.1 * t) == pytest.approx(3.0, abs=1e-5)
+    assert 0.0 < turning.time_upper[0] - turning.time_lower[0] <= 1e-6
+    cone = desk.ask(
+        "FirstContact",
+        **fields | {"shapes_a": shapes(gs.Cone(0.5, 1.0)), "shapes_b": shapes(gs.Sphere(1.0))},
+        twists_a=D([0.5, 0, 0, 0, 0, 0.1]),
+    )
+    assert cone.status == UNSUPPORTED and cone.item_status.tolist() == [4] and math.isnan(cone.time[0])
 
 
 def test_first_contact_of_all_pairs(desk) -> None:

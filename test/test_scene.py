@@ -443,33 +443,136 @@ def test_rotation_is_never_treated_as_translation():
     found = rows_of(answer)
     assert set(found) == {("bar", "near"), ("bar", "touched")}
     k = found["bar", "near"]
-    assert answer.status[k] == ContactStatus.UNSUPPORTED
-    assert np.isnan([answer.time[k], answer.time_lower[k], answer.time_upper[k], answer.last_time[k]]).all()
-    reason = "first contact of a polygon with angular velocity is unsupported"
-    assert answer.unsupported == [("bar", "near", reason)]
-    assert "angular velocity" in answer.message and "1 polygon that turn" in scene.plan()
+    # The near side of the bar, which is 0.1 from its middle, comes to the corner (0.5, 1.0).
+    expected = np.arctan2(1.0, 0.5) - np.arcsin(0.1 / np.hypot(0.5, 1.0))
+    assert answer.status[k] == ContactStatus.WILL_TOUCH and not answer.unsupported
+    assert answer.time_lower[k] <= expected <= answer.time_upper[k] <= answer.time_lower[k] + 1e-6
+    np.testing.assert_allclose(answer.points[answer.point_offsets[k]], [0.5, 1.0, 0.0], atol=1e-5)
+    assert np.isnan(answer.last_time[k]) and "followed while they turn, at tier float64: 1 object" in scene.plan()
     k = found["bar", "touched"]
-    assert answer.status[k] == ContactStatus.OVERLAPPING and answer.time[k] == 0.0
-    assert np.isnan(answer.last_time[k]), "nobody followed the turn"
-    assert answer.point_offsets[k + 1] - answer.point_offsets[k] == 4
+    assert answer.status[k] == ContactStatus.OVERLAPPING and answer.time[k] == 0.0 == answer.time_upper[k]
+    assert np.isnan(answer.last_time[k]), "nobody looks for the end"
     # Translating only, the same pair never touches.
-    still = scene_of([gs.SceneObject(o.id, o.shape, o.pose) for o in objects]).first_contacts(10.0)
-    assert set(rows_of(still)) == {("bar", "touched")}
+    still = scene_of([gs.SceneObject(o.id, o.shape, o.pose) for o in objects])
+    assert set(rows_of(still.first_contacts(10.0))) == {("bar", "touched")}
     # Without time to turn in, it is enough to look.
     assert set(rows_of(scene.first_contacts(0.0))) == {("bar", "touched")}
-    # Solids alike.
-    solids = [
-        gs.SceneObject("bar", gs.Box((2.0, 0.1, 0.1)), IDENTITY, spin),
-        gs.SceneObject("near", gs.Sphere(0.5), at(0.0, 1.5, 0.0)),
-    ]
-    answer = scene_of(solids).first_contacts(10.0)
-    assert answer.status.tolist() == [ContactStatus.UNSUPPORTED]
-    assert answer.unsupported == [
-        ("bar", "near", "first contact of solids with angular velocity (box-sphere) is unsupported")
-    ]
+    # Where it is not known how an object moves, nothing is followed.
+    lost = [gs.SceneObject(o.id, o.shape, o.pose, o.twist, motion_fault="who knows") for o in objects[:2]]
+    assert scene_of(lost).first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
+
+
+def spinning(name, shape, pose=IDENTITY, spin=(0.0, 0.0, 1.0), velocity=(0.0, 0.0, 0.0), **fields):
+    return gs.SceneObject(name, shape, pose, (*velocity, *spin), **fields)
+
+
+def test_solids_that_turn():
+    """A long box about its middle, against other solids that it comes to after a quarter of a turn, less a bit."""
+    bar = gs.Box((2.0, 0.1, 0.1))
+    reach = 1.5 - 0.5  # of the others, from the origin along y
+    for shape, first in (
+        (gs.Sphere(0.5), np.arccos(0.6 / 1.5)),
+        (gs.Capsule(0.5, 1.0), np.arccos(0.6 / 1.5)),
+        (gs.Box((0.5, 0.5, 0.5)), np.arctan2(reach, 0.5) - np.arcsin(0.1 / np.hypot(0.5, reach))),
+        (gs.Convex([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0, 0.5, 0.5), (0, 0.5, -0.5)]), None),
+        (gs.Point((0.0, 0.0, 0.0)), np.pi / 2 - np.arcsin(0.1 / 1.5)),
+    ):
+        for objects in (
+            [spinning("bar", bar), gs.SceneObject("other", shape, at(0.0, 1.5, 0.0))],
+            [gs.SceneObject("a", shape, at(0.0, 1.5, 0.0)), spinning("bar", bar)],
+        ):
+            answer = scene_of(objects).first_contacts(10.0)
+            assert answer.status.tolist() == [ContactStatus.WILL_TOUCH], shape
+            assert answer.time_upper[0] - answer.time_lower[0] <= 1e-6
+            if first is None:
+                first = np.arctan2(reach, 0.5) - np.arcsin(0.1 / np.hypot(0.5, reach))
+            assert answer.time_lower[0] <= first + 1e-12 and first - 1e-12 <= answer.time_upper[0], shape
+            assert answer.cost.counts["rotation"] == 1
+            side = 1.0 if answer.ids_a == ["bar"] else -1.0
+            if shape.kind != "point":  # the face of the bar, or its normal there
+                np.testing.assert_allclose(side * answer.normal[0], [-np.sin(first), np.cos(first), 0.0], atol=1e-5)
+    # The point on a ball is on its surface.
+    ball = scene_of([spinning("bar", bar), gs.SceneObject("ball", gs.Sphere(0.5), at(0.0, 1.5, 0.0))]).first_contacts(
+        9.0
+    )
+    assert np.linalg.norm(ball.points[0] - [0.0, 1.5, 0.0]) == pytest.approx(0.5, abs=1e-5)
+    # Out of reach for ever, and what no kernel follows.
+    far = scene_of([spinning("bar", bar), gs.SceneObject("ball", gs.Sphere(0.5), at(0.0, 3.0, 0.0))])
+    assert len(far.first_contacts(INF)) == 0
+    cone = scene_of([spinning("bar", bar), gs.SceneObject("cone", gs.Cone(0.5, 1.0), at(0.0, 1.5, 0.0))])
+    assert cone.first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
     # Turning alike is not being at rest relative to each other: each turns about its own origin.
-    alike = [gs.SceneObject(o.id, o.shape, o.pose, spin) for o in solids]
-    assert scene_of(alike).first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
+    for away, statuses in ((0.3, []), (1.5, [ContactStatus.WILL_TOUCH]), (5.0, [])):
+        alike = scene_of([spinning("a", bar), spinning("b", bar, at(0.0, away, 0.0), spin=(0.0, 0.0, 1.0))])
+        assert alike.first_contacts(INF if away > 1.0 else 0.1).status.tolist() == statuses
+    crossed = scene_of([spinning("a", bar), spinning("b", bar, at(0.0, 3.0, 0.0), spin=(0.0, 0.0, -1.0))])
+    assert crossed.first_contacts(INF).status.tolist() == [ContactStatus.WILL_TOUCH]
+
+
+def test_solids_that_turn_and_are_uncertain():
+    bar, ball = gs.Box((2.0, 0.1, 0.1)), gs.Sphere(0.5)
+
+    def of(by=0.0, drift=0.0, away=1.5):
+        pair = [spinning("bar", bar, uncertainty=by, velocity_uncertainty=drift)]
+        return scene_of([*pair, gs.SceneObject("ball", ball, at(0.0, away, 0.0))]).first_contacts(1.3)
+
+    sure, vague, drifting = of(), of(by=0.01), of(drift=0.01)
+    first = np.arccos(0.6 / 1.5)
+    assert sure.time[0] == vague.time[0] == drifting.time[0]
+    # 0.01 nearer or farther along the normal.
+    assert vague.time_lower[0] <= np.arccos(0.61 / 1.5) <= vague.time_lower[0] + 1e-6
+    assert np.arccos(0.59 / 1.5) <= vague.time_upper[0] <= first + 0.05
+    assert first - 0.02 <= drifting.time_lower[0] < first < drifting.time_upper[0] <= first + 0.05
+    # Just out of reach of the bar's corner, and not so sure.
+    away = np.hypot(2.0, 0.1) + 0.5
+    assert len(of(away=away + 0.005)) == 0
+    may = of(by=0.01, away=away + 0.005)
+    assert len(may) == 0 or may.time_upper[0] == INF  # only if it can turn there in time
+    turned = scene_of(
+        [spinning("bar", bar, uncertainty=0.01), gs.SceneObject("ball", ball, at(0.0, away + 0.005, 0.0))]
+    ).first_contacts(3.0)
+    assert turned.status.tolist() == [ContactStatus.NEVER] and turned.time_upper[0] == INF
+    assert 1.4 < turned.time_lower[0] < np.pi / 2
+
+
+def test_turning_objects_as_the_queries_see_them():
+    """The scene adds placing and choosing, no geometry: all pairs of boxes and hulls that fly about."""
+    rng = np.random.default_rng(17)
+    objects = []
+    for k in range(30):
+        shape = gs.Box(rng.uniform(0.1, 0.6, 3)) if k % 2 else gs.Convex(rng.normal(size=(7, 3)) * 0.4)
+        objects.append(
+            gs.SceneObject(f"o{k:02d}", shape, random_pose(rng, 1.8), (*rng.normal(size=3) * 0.5, *rng.normal(size=3)))
+        )
+    scene = scene_of(objects)
+    answer = scene.first_contacts(2.0)
+    found, world = rows_of(answer), scene.world
+    assert len(found) > 20 and (answer.status == ContactStatus.WILL_TOUCH).sum() > 10
+    for i in range(30):
+        for j in range(i + 1, 30):
+            rows = np.array([i, j])
+            sides = []
+            for row in rows:
+                shape, pose = objects[row].shape, world.poses[row]
+                if isinstance(shape, gs.Box):
+                    sides.append(
+                        gs.Boxes(pose[None, :3], world.rotations[row][None].swapaxes(1, 2), [shape.half_extents])
+                    )
+                else:
+                    turn, (x, y, z) = world.rotations[row], shape.vertices.T
+                    placed = np.column_stack([t[0] * x + t[1] * y + t[2] * z for t in turn]) + pose[:3]
+                    sides.append(gs.Polytopes.from_list([placed]))
+            linear, angular = world.twists[rows, :3], world.twists[rows, 3:]
+            single = gs.first_contact(
+                *sides, *linear, angular_velocity_a=angular[0], angular_velocity_b=angular[1],
+                center_a=world.poses[i, :3], center_b=world.poses[j, :3], t_max=2.0,
+            )  # fmt: skip
+            k = found.get((objects[i].id, objects[j].id))
+            if k is None:
+                assert single.status == gs.NEVER
+            else:
+                assert (answer.status[k], answer.time[k]) == (single.status[0], single.time[0])
+                assert answer.time_upper[k] == single.time_upper[0]
 
 
 def moving_solids(n, seed, span=3.0):

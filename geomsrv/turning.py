@@ -1,0 +1,156 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""First contact of bodies that translate and turn: the part of `first_contact` with an angular velocity."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geomsrv import _core, _validate
+from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray
+from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.shapes import Boxes, Polygons, Polytopes
+
+__all__ = ["first_contact_turning", "turns"]
+
+Bodies = Boxes | Polygons | Polytopes
+
+
+def turns(*angular_velocities: ArrayLike | None) -> bool:
+    """Whether any is given and not zero."""
+    given = (_validate.array(w, "angular_velocity") for w in angular_velocities if w is not None)
+    return any(w.dtype.kind not in "fiu" or bool(np.any(w != 0)) for w in given)
+
+
+def first_contact_turning(
+    bodies: tuple[Any, Any],
+    velocities: tuple[ArrayLike, ArrayLike],
+    angular_velocities: tuple[ArrayLike | None, ArrayLike | None],
+    centers: tuple[ArrayLike | None, ArrayLike | None],
+    *,
+    t_max: float,
+    tolerance: float,
+    accuracy: str,
+    contact_set: bool,
+    certificates: bool,
+) -> FirstContacts:
+    """The answer of `first_contact`, whose arguments these are, each for a and b."""
+    start = time.perf_counter_ns()
+    flat = isinstance(bodies[0], Polygons)
+    kinds = (Polygons,) if flat else (Boxes, Polytopes)
+    for body, name in zip(bodies, "ab", strict=True):
+        if not isinstance(body, kinds):
+            names = " or ".join(kind.__name__ for kind in (kinds if name == "b" else (Boxes, Polygons, Polytopes)))
+            raise GeometryError(f"{name} must be {names}, got {type(body).__name__}")
+    sizes = [len(body) for body in bodies]
+    if sizes[0] != sizes[1] and 1 not in sizes:
+        raise GeometryError(
+            f"a and b must have the same length, or one of them length 1; got {sizes[0]} and {sizes[1]}"
+        )
+    count = sizes[1] if sizes[0] == 1 else sizes[0]
+    d = 2 if flat else 3
+    end = _validate.limit(t_max, "t_max")
+    step = _validate.scalar(tolerance, "tolerance", positive=True)
+    tier = _validate.accuracy(accuracy, _validate.ACCURACIES)
+    if tier != "float64":
+        raise NotAvailableError(
+            f"accuracy={tier!r} is not available for bodies that turn, whose sines are no rational numbers; "
+            "'float64' proves its bounds"
+        )
+    if _validate.certificates(certificates, tier):
+        raise NotAvailableError("certificates are not available for bodies that turn")
+    sides = []
+    for body, velocity, angular, center, name in zip(
+        bodies, velocities, angular_velocities, centers, "ab", strict=True
+    ):
+        parts = (
+            _rows(velocity, f"velocity_{name}", count, d),
+            _angular(angular, f"angular_velocity_{name}", count, flat),
+            _middles(body) if center is None else _rows(center, f"center_{name}", count, d),
+        )
+        motion = np.zeros((max(len(part) for part in parts), 9))
+        for k, part in enumerate(parts):
+            motion[:, 3 * k : 3 * k + part.shape[1]] = part
+        sides.append((_packed(body), motion))
+    (body_a, motion_a), (body_b, motion_b) = sides
+    status, lower, upper, normal, point, wide, looks = _core.first_contact_turning(
+        body_a, body_b, motion_a, motion_b, end, step, np.zeros((1, 3))
+    )
+    found = ~np.isnan(point[:, 0]) if contact_set else np.zeros(count, np.bool_)
+    certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)
+    counts = {
+        "filter": int(np.count_nonzero(~wide)),
+        "wide": int(np.count_nonzero(wide)),
+        "looks": int(looks.sum()),
+    }
+    return FirstContacts(
+        status=status,
+        time=lower.copy(),
+        time_lower=lower,
+        time_upper=upper,
+        last_time=np.full(count, np.nan),
+        normal=np.ascontiguousarray(normal[:, :d]),
+        points=np.ascontiguousarray(point[found, :d]),
+        point_offsets=np.concatenate([[0], np.cumsum(found, dtype=np.int64)]),
+        certain=certain,
+        _closing_speed=_closing_speed(lower, normal, point, motion_a, motion_b),
+        cost=Cost(time.perf_counter_ns() - start, tier, counts),
+    )
+
+
+def _closing_speed(
+    moment: FloatArray, normal: FloatArray, point: FloatArray, motion_a: FloatArray, motion_b: FloatArray
+) -> FloatArray:
+    """(n,) speed at which the bodies approach at their contact point; NaN without one."""
+
+    def velocity(motion: FloatArray) -> FloatArray:
+        linear, angular, center = motion[:, :3], motion[:, 3:6], motion[:, 6:]
+        return linear + np.cross(angular, point - (center + moment[:, None] * linear))
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        x, y, z = ((velocity(motion_a) - velocity(motion_b)) * normal).T
+        speed: FloatArray = x + y + z  # in this order everywhere
+    return speed
+
+
+def _packed(body: Bodies) -> tuple[Any, ...]:
+    """As the engine reads it."""
+    return (body.center, body.axes, body.half_extents) if isinstance(body, Boxes) else (body.vertices, body.offsets)
+
+
+def _middles(body: Bodies) -> FloatArray:
+    """(n, d) centres of boxes, or the middles of the bounding boxes, rounded: what a body turns about by default."""
+    if isinstance(body, Boxes):
+        return body.center
+    first = body.offsets[:-1]
+    least, most = (extreme.reduceat(body.vertices, first, axis=0) for extreme in (np.minimum, np.maximum))
+    middle: FloatArray = 0.5 * least + 0.5 * most
+    return middle
+
+
+def _angular(value: ArrayLike | None, name: str, count: int, flat: bool) -> FloatArray:
+    """(n, 3), (1, 3) or zeros; in the plane a number or (n,) about the third axis."""
+    if value is None:
+        return np.zeros((1, 3))
+    if not flat:
+        return _rows(value, name, count, 3)
+    given = _validate.array(value, name)
+    rates = _validate.floats(given, name, () if given.ndim == 0 else (None,)).reshape(-1)
+    if len(rates) not in (1, count):
+        raise GeometryError(f"{name} must be one number or have shape ({count},), got shape {given.shape}")
+    turning = np.zeros((len(rates), 3))
+    turning[:, 2] = rates
+    return turning
+
+
+def _rows(value: ArrayLike, name: str, count: int, dimension: int) -> FloatArray:
+    """(n, d) or (d,) -> (n, d) or (1, d)."""
+    given = _validate.array(value, name)
+    rows = _validate.floats(given, name, (dimension,) if given.ndim == 1 else (None, dimension)).reshape(-1, dimension)
+    if len(rows) not in (1, count):
+        raise GeometryError(f"{name} must have shape ({dimension},) or ({count}, {dimension}), got {given.shape}")
+    return rows

@@ -1,0 +1,135 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""First contact of listed pairs of objects, whatever way they move; pairs that turn are followed here.
+
+Every object turns about the origin of its pose.  What an object may be off by is told to the engine, which then
+proves its bounds for all bodies within; status, time and contact point are those of the bodies as given.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import product
+
+import numpy as np
+
+from geomsrv import _core
+from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
+from geomsrv.narrow_phase import ContactRows, Unsupported, count_kinds, first_contact_rows, placed_hulls
+from geomsrv.world import ROUNDOFF, World, gather
+
+__all__ = ["contact_rows", "followed_in_turning"]
+
+# Widest time interval of a contact while nothing is uncertain [s].
+TIME_TOLERANCE = 1e-6
+
+# The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
+CAPSULE_ROUNDING = 16.0 * ROUNDOFF
+
+FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, beside polygons
+
+
+def contact_rows(
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
+    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
+    followed = world.turns[pairs].any(axis=1) & followed_in_turning(world)[pairs].all(axis=1) & (horizon > 0.0)
+    if tier != "float64" or not followed.any():
+        return first_contact_rows(world, pairs, horizon, tier, counts)
+    turning = pairs[followed]
+    count_kinds(world, turning, counts)
+    counts["rotation"] += len(turning)
+    rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, tier, counts)
+    return ContactRows.joined([_turning_contacts(world, turning, horizon), rows]), unsupported
+
+
+def followed_in_turning(world: World) -> BoolArray:
+    """(n,) bool: objects that can be followed while they turn."""
+    codes = [code for code, name in enumerate(_core.shape_kinds()) if name in FOLLOWED]
+    followed: BoolArray = world.planar | np.isin(world.kinds, codes)
+    followed[list(world.motion_faults)] = False
+    return followed
+
+
+def _turning_contacts(world: World, pairs: IntArray, horizon: float) -> ContactRows:
+    slack = _slack(world, pairs)
+    status, lower, upper, normal, point = _ask(world, pairs, horizon, slack)
+    doubt = np.column_stack([world.uncertainty[pairs].sum(axis=1), world.velocity_uncertainty[pairs].sum(axis=1)])
+    vague = np.flatnonzero(doubt.any(axis=1))
+    time = lower.copy()
+    if len(vague):
+        slack[vague, 1:] += doubt[vague]
+        may, first, last, *_ = _ask(world, pairs[vague], horizon, slack[vague])
+        never = status[vague] == ContactStatus.NEVER
+        lower[vague] = np.where(never, first, np.fmin(first, lower[vague]))
+        upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
+    # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
+    radius = _radius(world)[pairs]
+    uneven = np.flatnonzero(radius[:, 0] != radius[:, 1])
+    point[uneven] += 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
+    points = np.empty(len(pairs), dtype=object)
+    for k in np.flatnonzero(~np.isnan(point[:, 0])).tolist():
+        points[k] = point[k : k + 1]
+    rows = ContactRows(pairs, status, time, lower, upper, np.full(len(pairs), np.nan), normal, points)
+    return rows.take((status != ContactStatus.NEVER) | ~np.isnan(lower))
+
+
+def _ask(
+    world: World, pairs: IntArray, horizon: float, slack: FloatArray
+) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Status, lower, upper, normal and point from the engine."""
+    count = len(pairs)
+    status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
+    normal, point = np.zeros((count, 3)), np.zeros((count, 3))
+    planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
+    motion = np.column_stack([world.twists, world.poses[:, :3]])
+    motion[world.planar, 8] = 0.0
+    for flat, *is_box in product((True, False), repeat=3):
+        part = (planar == flat) & (boxes == is_box).all(axis=1)
+        if not part.any():
+            continue
+        side_a, side_b = (_side(world, pairs[part, k], flat, is_box[k]) for k in range(2))
+        motion_a, motion_b = (np.ascontiguousarray(motion[pairs[part, k]]) for k in range(2))
+        found = _core.first_contact_turning(side_a, side_b, motion_a, motion_b, horizon, TIME_TOLERANCE, slack[part])
+        status[part], lower[part], upper[part], normal[part], point[part] = found[:5]
+    return status, lower, upper, normal, point
+
+
+def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatArray | IntArray, ...]:
+    """Objects of one sort as the engine reads them: what is placed here is from then on taken literally."""
+    if flat:
+        return gather(*world.rings, rows)
+    if boxes:
+        axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
+        return np.ascontiguousarray(world.poses[rows, :3]), axes, world.table.half[world.shape[rows]]
+    kinds = world.kinds[rows]
+    hull, capsule = map(_core.shape_kinds().index, ("convex", "capsule"))
+    if (kinds == hull).all():
+        return placed_hulls(world, rows)
+    half = np.where(kinds == capsule, world.table.packed.params[world.shape[rows], 1], 0.0)
+    items = []
+    for row, along in zip(rows.tolist(), half.tolist(), strict=True):
+        if world.kinds[row] == hull:
+            items.append(placed_hulls(world, np.array([row]))[0])
+        else:
+            place, axis = world.poses[row, :3], along * world.rotations[row][:, 2]
+            items.append(np.array([place - axis, place + axis])[: 2 if along else 1])
+    return np.concatenate(items), np.cumsum([0, *map(len, items)], dtype=np.int64)
+
+
+def _radius(world: World) -> FloatArray:
+    """(n,) rounding radius of spheres and capsules."""
+    codes = [code for code, name in enumerate(_core.shape_kinds()) if name in ("sphere", "capsule")]
+    radius: FloatArray = np.where(np.isin(world.kinds, codes), world.table.round[world.shape], 0.0)
+    return radius
+
+
+def _slack(world: World, pairs: IntArray) -> FloatArray:
+    """(k, 3) margin, uncertainty, drift of the bodies as given."""
+    names, params = _core.shape_kinds(), world.table.packed.params[world.shape]
+    corners = np.where(world.kinds == names.index("convex"), params[:, 0], 0.0)  # rounded ones, of a frustum
+    size = np.abs(world.poses[:, :3]).sum(axis=1) + world.table.reach[world.shape]
+    ends = np.where(world.kinds == names.index("capsule"), CAPSULE_ROUNDING * size, 0.0)
+    margin = _radius(world)[pairs].sum(axis=1)
+    off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + ROUNDOFF * margin
+    return np.column_stack([margin, off, np.zeros(len(pairs))])
