@@ -62,15 +62,19 @@ def _first_contacts(world: World) -> list[str]:
         lines.append(f"- followed while they turn, at tier float64: {_count(turning, 'object')}")
     elif not world.turns.any():
         lines.append("- rotation: skipped, nothing turns")
+    if rolling := int((sliding & spinning & ~known)[solids].sum()):
+        lines.append(
+            f"- followed step by step, at tier float64: {_count(rolling, 'sphere or capsule', 'spheres and capsules')}"
+        )
     if lost := int((world.turns & ~spinning)[polygons].sum()):
         lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
-    strange = int((moving & ~(known & sliding) & ~(spinning & world.turns))[solids].sum())
+    strange = int((moving & ~(known & sliding) & ~spinning)[solids].sum())
     if strange:
         lines.append(
             f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "
             "against whatever moves differently"
         )
-    if (sliding & known)[solids].any() and not known[solids].all():
+    if (sliding & known)[solids].any() and not spinning[solids].all():
         lines.append("- unsupported unless in contact now: boxes and hulls that move, against solids of other kinds")
     return lines
 

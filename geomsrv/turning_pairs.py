@@ -1,8 +1,9 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""First contact of listed pairs of objects, whatever way they move; pairs that turn are followed here.
+"""First contact of listed pairs of objects, whatever way they move; pairs that turn, and round ones, are followed here.
 
-Every object turns about the origin of its pose.  What an object may be off by is told to the engine, which then
+Every object turns about the origin of its pose.  A sphere or capsule that only translates has no closed form of its
+own: it is followed like one that turns at no speed.  What an object may be off by is told to the engine, which then
 proves its bounds for all bodies within; status, time and contact point are those of the bodies as given.
 """
 
@@ -15,7 +16,14 @@ import numpy as np
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
-from geomsrv.narrow_phase import ContactRows, Unsupported, count_kinds, first_contact_rows, placed_hulls
+from geomsrv.narrow_phase import (
+    ContactRows,
+    Unsupported,
+    count_kinds,
+    first_contact_rows,
+    followed_solids,
+    placed_hulls,
+)
 from geomsrv.world import ROUNDOFF, World, gather
 
 __all__ = ["contact_rows", "followed_in_turning"]
@@ -33,14 +41,24 @@ def contact_rows(
     world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
-    followed = world.turns[pairs].any(axis=1) & followed_in_turning(world)[pairs].all(axis=1) & (horizon > 0.0)
+    turns = world.turns[pairs].any(axis=1)
+    followed = (turns | _rolling(world, pairs)) & followed_in_turning(world)[pairs].all(axis=1) & (horizon > 0.0)
     if tier != "float64" or not followed.any():
         return first_contact_rows(world, pairs, horizon, tier, counts)
-    turning = pairs[followed]
-    count_kinds(world, turning, counts)
-    counts["rotation"] += len(turning)
+    count_kinds(world, pairs[followed], counts)
+    if (rotating := followed & turns).any():
+        counts["rotation"] += int(rotating.sum())
     rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, tier, counts)
-    return ContactRows.joined([_turning_contacts(world, turning, horizon), rows]), unsupported
+    return ContactRows.joined([_turning_contacts(world, pairs[followed], horizon), rows]), unsupported
+
+
+def _rolling(world: World, pairs: IntArray) -> BoolArray:
+    """(k,) bool: solids of which one is round, at different velocities."""
+    flat = world.planar[pairs[:, 0]] | followed_solids(world)[pairs].all(axis=1)
+    velocity = world.twists[pairs, :3]
+    apart = (velocity[:, 0] != velocity[:, 1]).any(axis=1) | world.velocity_uncertainty[pairs].any(axis=1)
+    rolling: BoolArray = ~flat & apart
+    return rolling
 
 
 def followed_in_turning(world: World) -> BoolArray:

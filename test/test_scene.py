@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import threading
 import time
 from fractions import Fraction
@@ -654,7 +655,7 @@ def test_prisms_meet_when_their_bases_do():
                 assert (solid.time_lower <= flat.time + 1e-12).all() and (solid.time_upper >= flat.time - 1e-12).all()
 
 
-def test_solids_touch_now_or_never_or_are_unsupported():
+def test_balls_that_roll():
     push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     ball = gs.Sphere(1.0)
     objects = [
@@ -662,7 +663,7 @@ def test_solids_touch_now_or_never_or_are_unsupported():
         gs.SceneObject("a1", ball, at(2.0, 0.0, 0.0), push),  # touches a0, moves along with it
         gs.SceneObject("a2", ball, at(4.5, 0.0, 0.0), push),  # apart from a1, moves along
         gs.SceneObject("b", ball, at(7.0, 0.0, 0.0)),  # will be hit
-        gs.SceneObject("c", ball, at(7.5, 0.0, 0.0)),  # overlaps b
+        gs.SceneObject("c", ball, at(7.25, 0.0, 0.0)),  # overlaps b
         gs.SceneObject("d", ball, at(0.0, 50.0, 0.0), push),  # alone
     ]
     answer = scene_of(objects).first_contacts(1.0)
@@ -674,17 +675,47 @@ def test_solids_touch_now_or_never_or_are_unsupported():
     np.testing.assert_allclose(answer.points[answer.point_offsets[k]], [1.0, 0.0, 0.0], atol=1e-12)
     k = found["b", "c"]
     assert answer.status[k] == ContactStatus.OVERLAPPING and answer.time_upper[k] == 0.0
-    assert np.isnan(answer.normal[found["a2", "b"]]).all()
-    for pair in (("a2", "b"), ("a2", "c")):
-        assert answer.status[found[pair]] == ContactStatus.UNSUPPORTED
-        assert (*pair, "first contact of moving solids (sphere-sphere) is unsupported") in answer.unsupported
+    for pair, time in ((("a2", "b"), 0.5), (("a2", "c"), 0.75)):
+        k = found[pair]
+        assert answer.status[k] == ContactStatus.WILL_TOUCH
+        assert answer.time_lower[k] <= time <= answer.time_upper[k] <= answer.time_lower[k] + 1e-6
+        np.testing.assert_allclose(answer.normal[k], [1.0, 0.0, 0.0], atol=1e-6)
     close = [gs.SceneObject("a", ball, IDENTITY, push), gs.SceneObject("b", ball, at(1.9, 1.9, 1.0))]
-    assert scene_of(close).first_contacts(1.0).status.tolist() == [ContactStatus.UNSUPPORTED]
+    assert len(scene_of(close).first_contacts(1.0)) == 0  # the boxes meet, the balls do not
     assert len(scene_of(close).first_contacts(0.0)) == 0
+    answer = scene_of(objects).first_contacts(1.0, accuracy="exact")
+    assert answer.status[rows_of(answer)["a2", "b"]] == ContactStatus.UNSUPPORTED
+    assert ("a2", "b", "first contact of moving solids (sphere-sphere) is unsupported") in answer.unsupported
     # Half spaces go on for ever, and so does this horizon.
     floor = gs.SceneObject("floor", gs.HalfSpace((0.0, 0.0, 1.0), -5.0), IDENTITY, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     assert len(scene_of([objects[3], floor]).first_contacts(1.0)) == 0
     assert len(scene_of([objects[3], floor]).first_contacts(INF)) == 1
+
+
+def test_balls_meet_when_the_quadratic_says(rng):
+    """|p + v t| = r_a + r_b, solved in fractions as far as the root."""
+    hits = 0
+    for _ in range(200):
+        p, v, (ra, rb) = rng.uniform(-3.0, 3.0, 3), rng.normal(size=3), rng.uniform(0.1, 1.0, 2)
+        still = gs.SceneObject("b", gs.Sphere(rb))
+        answer = scene_of([gs.SceneObject("a", gs.Sphere(ra), at(*p), (*v, 0.0, 0.0, 0.0)), still]).first_contacts(9.0)
+        (x, y, z), (a, b, c) = ([Fraction(number) for number in vector.tolist()] for vector in (p, v))
+        square, half = a * a + b * b + c * c, x * a + y * b + z * c
+        rest = x * x + y * y + z * z - (Fraction(ra) + Fraction(rb)) ** 2
+        if rest <= 0:
+            assert answer.status.tolist() == [ContactStatus.OVERLAPPING if rest else ContactStatus.TOUCHING]
+            continue
+        radicand = half * half - square * rest
+        time = (-float(half) - math.sqrt(radicand)) / float(square) if radicand >= 0 and half < 0 else INF
+        if time > 9.0:
+            assert len(answer) == 0
+        else:
+            hits += 1
+            assert answer.status.tolist() == [ContactStatus.WILL_TOUCH]
+            rounding = 1e-14 * (1.0 + time)  # of the root and the quotient above
+            assert answer.time_lower[0] - rounding <= time <= answer.time_upper[0] + rounding
+            assert answer.time_upper[0] - answer.time_lower[0] <= 1e-6
+    assert hits >= 20
 
 
 # -------------------------------------------------------------------------------------------------------- uncertainty
@@ -1261,12 +1292,11 @@ def test_plan_says_what_is_computed_and_what_is_not():
     assert "nothing moves, nothing is swept" in scene.plan() and "unsupported" not in scene.plan()
     scene.set_states(["a"], [IDENTITY], [(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)])
     assert "boxes swept for 1 moving object" in scene.plan()
-    assert "unsupported unless in contact now: 1 moving solid" in scene.plan()
+    assert "followed step by step, at tier float64: 1 sphere or capsule" in scene.plan()
     assert "2 solids (sphere 2)" in scene.plan()
-    assert "followed" not in scene.plan()
     push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     boxes = [gs.SceneObject(name, gs.Box((1.0, 1.0, 1.0)), at(5.0 * k, 0.0, 0.0), push) for k, name in enumerate("xyz")]
     scene = scene_of(boxes)
     assert "followed in translation: 3 boxes and hulls" in scene.plan() and "unsupported" not in scene.plan()
-    scene.apply(gs.SceneUpdate(add=[gs.SceneObject("ball", gs.Sphere(1.0), at(0.0, 9.0, 0.0))]))
+    scene.apply(gs.SceneUpdate(add=[gs.SceneObject("floor", gs.HalfSpace((0.0, 0.0, 1.0), -9.0))]))
     assert "unsupported unless in contact now: boxes and hulls that move, against solids of other kinds" in scene.plan()
