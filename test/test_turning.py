@@ -385,6 +385,36 @@ def test_field_cases(case: dict[str, Any], planar: bool) -> None:
     assert not provable or answer.time_upper[0] >= expected
 
 
+def test_any_finite_numbers(rng: np.random.Generator) -> None:
+    """Whatever the magnitudes, the work is bounded and the outcome keeps its promises."""
+
+    def numbers(*shape: int) -> np.ndarray:
+        with np.errstate(over="ignore", under="ignore"):
+            some = rng.normal(size=shape) * 10.0 ** rng.choice(
+                [0, 0, 0, 1, -1, 5, -20, 100, -100, 290, -310], size=shape
+            )
+        return np.where(rng.random(shape) < 0.2, 0.0, some)
+
+    outcomes: Counter[int] = Counter()
+    for _ in range(120):
+        pair: Pair = {x: numbers(int(rng.integers(1, 6)), 3) for x in "ab"}
+        pair |= {f"{name}{x}": numbers(3) for x in "ab" for name in "vwc"}
+        if rng.random() < 0.3:
+            pair |= {"a": rng.normal(size=(4, 3)), "b": rng.normal(size=(4, 3)) + 3.0}
+        pair["wa"][0] = 1.0
+        t_max = float(rng.choice([0.0, 1.0, 1e-300, 1e300, np.inf]))
+        tolerance = float(rng.choice([1e-6, 1e-300, 1e300, 1e-12]))
+        answer = ask(pair, t_max=t_max, tolerance=tolerance)
+        status, lower, upper = (x[0] for x in (answer.status, answer.time_lower, answer.time_upper))
+        outcomes[int(status)] += 1
+        text = reproducer(**pair, t_max=t_max, tolerance=tolerance) + f"\n{answer}"
+        assert answer.cost.counts["looks"] <= 1.01 * 2**16, text
+        assert np.isnan(lower) if status == gs.NEVER else 0.0 <= lower <= upper and lower <= t_max, text
+        if status == gs.WILL_TOUCH:
+            assert upper <= t_max and (upper - lower <= tolerance or upper == np.nextafter(lower, np.inf)), text
+    assert outcomes[gs.NEVER] >= 10 and outcomes[gs.TOUCHING] + outcomes[gs.OVERLAPPING] >= 5, outcomes
+
+
 # ------------------------------------------------------------------------------------------------------- laws
 
 
