@@ -179,6 +179,26 @@ double turn_of(const MovingPair& pair, double width) {
     return width > 0.0 ? std::min(pair.noise() / width, kLargestSlack) : kLargestSlack;
 }
 
+/// A facet of K of two boxes: unit normal, and width as of Limit.
+struct BoxFacet {
+    Vec3 normal;
+    double width;
+};
+
+BoxFacet facet_of(const ExactBody& a, const ExactBody& b, int axis) {
+    const bool edges = axis >= 6;
+    const ExactBody& first = axis < 3 || edges ? a : b;
+    const ExactBody& second = edges ? b : first;
+    const int i = edges ? (axis - 6) / 3 : (axis + 1) % 3;
+    const int j = edges ? (axis - 6) % 3 : (axis + 2) % 3;
+    const Vec3 product = cross(first.axis[i], second.axis[j]);
+    const double size = norm(product);
+    const double e = first.half[i];
+    const double f = second.half[j];
+    // Of the triangle with the edges 2 e and 2 f; they are about perpendicular, or the facet is slender.
+    return {(1.0 / size) * product, e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * size : 0.0};
+}
+
 /// Contact within the slack.
 class Nearly {
 public:
@@ -366,14 +386,54 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     } else {
         out = doubtful_contact(cast, t_max, moment, width);
     }
-    if (!contact_set || out.status == ContactStatus::never) {
-        return out;
+    if (contact_set && out.status != ContactStatus::never) {
+        add_points(moment, width, out);
     }
+    return out;
+}
+
+PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
+                                             bool contact_set, const BoxMotion& known) {
+    const bool overlaps = known.verdict == BoxMotion::Verdict::overlapping;
+    if (known.verdict == BoxMotion::Verdict::never) {
+        return never(true, Rung::filter);
+    }
+    if (known.verdict == BoxMotion::Verdict::unclear) {
+        return solve(a, b, t_max, contact_set);
+    }
+    PolytopeContact out = never(true, Rung::filter);
+    out.last_time = std::min(known.last_time, t_max);
+    double width = 0.0;
+    if (overlaps) {
+        out.status = ContactStatus::overlapping;
+        out.time = out.time_lower = out.time_upper = 0.0;
+    } else {
+        const BoxFacet facet = facet_of(a.body, b.body, known.axis);
+        if (contact_set && !(facet.width > 0.0)) {
+            return solve(a, b, t_max, contact_set);
+        }
+        width = facet.width;
+        out.status = ContactStatus::will_touch;
+        out.time = known.time;
+        out.time_lower = known.time_lower;
+        out.time_upper = known.time_upper;
+        // No zero of the wrong sign.
+        out.normal = (known.against ? -facet.normal : facet.normal) + Vec3{};
+        out.closing_speed = -dot(out.normal, b.velocity - a.velocity);
+    }
+    if (contact_set) {
+        pair_.load(a, b);
+        add_points(out.time, width, out);
+    }
+    return out;
+}
+
+void PolytopeContactSolver::add_points(double moment, double width, PolytopeContact& out) {
     const double reach = pair_.reach();
     const double rounding = 2.0 * kLowestError * reach;
     if (out.status == ContactStatus::overlapping) {
         out.points = points_.overlapping(pair_, pair_.noise() + rounding);
-        return out;
+        return;
     }
     // Noise turns the plane, and it shifts the time, hence the place.
     ContactSlack slack{};
@@ -385,7 +445,6 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     const double delay = moment > 0.0 && shift < rate * limit ? shift / rate : moment > 0.0 ? limit : 0.0;
     slack.place = std::min(2.0 * pair_.noise() + delay, limit) + rounding;
     out.points = points_.touching(pair_, out.normal, moment, slack);
-    return out;
 }
 
 PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, double t_max, double& moment,

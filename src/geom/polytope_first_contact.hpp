@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "geom/box_motion.hpp"
 #include "geom/contact_points.hpp"
 #include "geom/contact_status.hpp"
 #include "geom/exact_contact_points.hpp"
@@ -39,7 +40,14 @@ public:
     /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
     PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set);
 
+    /// The same of boxes of which the axes have been asked.
+    PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set,
+                          const BoxMotion& known);
+
 private:
+    /// Points of contact, `moment` after the start; `width` as of Limit.
+    void add_points(double moment, double width, PolytopeContact& out);
+
     /// Solved exactly, then judged by the slack.
     PolytopeContact doubtful_contact(const LineCast& cast, double t_max, double& moment, double& width);
 

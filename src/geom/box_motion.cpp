@@ -1,0 +1,394 @@
+// Copyright 2026 The geomsrv authors
+// SPDX-License-Identifier: Apache-2.0
+// With d = b - a of the centers, w that of the velocities, edges a_i, b_j of about unit length and half
+// extents e_i, f_j: along an axis m the bodies are in contact while |m . (d + t w)| <= r, where
+// r = sum e_i |m . a_i| + sum f_j |m . b_j|.  The axes are the products of two of the six edges: their slabs
+// make up the difference of the boxes, flat ones included (a flat box is a limit of boxes with the same
+// edges).  Contact is from the latest entry on until the earliest exit.
+#include "geom/box_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "geom/core.hpp"
+#include "geom/exact_body.hpp"
+#include "geom/lanes.hpp"
+#include "geom/moving_pair.hpp"
+#include "geom/rounding.hpp"
+
+namespace geomsrv {
+
+namespace {
+
+using Four = VectorOf<Lanes>;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Edges are perpendicular unit vectors but for 1e-2 in each of their products: they are no longer than 1.005,
+// and so is r, in terms of the half extents, than 1.02.
+constexpr double kStretch = 1.02;
+
+// Errors along an axis, in terms of u times |d| + sum e_i + sum f_j.  P is the product of two vectors with
+// magnitudes for terms: |P| <= sqrt(2) times their lengths, and 1.25 if they are edges of one box, because
+// then the magnitudes of the three parts of their scalar product make at most 1, half of each sign.
+//
+//   m = a_i x a_j    2 P
+//   m . d            2 + 1 (d) + 1 (product) + 2 (sums) = 6 of 1.25 |d|                            <= 7.5
+//   b_j . (d x a_i)  1 (d) + 2 (P) + 1 (product) + 2 (sums) = 6 of sqrt(2) |d|                     <= 8.7
+//   m . b_j          2 + 1 + 2 = 5 of 1.25, then times f_j and three sums: 6.4 + 4, of 1.02        <= 10.7
+//   |m . d| - r      1 more of each                                                                <= 12
+//
+// One more for higher orders and for the rounding of the bound.  All 15 widths are made of numbers m . b_j
+// and m . a_i of faces, because a_k . (a_i x b_j) = b_j . (a_k x a_i).
+constexpr double kGapError = 13 * kUnitRoundoff;
+
+// Likewise for the rate m . w, in terms of |w|: 8.7, rounded up.
+constexpr double kRateError = 10 * kUnitRoundoff;
+
+// A rate is clear if it is this many times its error, which then is a share y <= 1/5 of it, and
+// 1 / (1 - y) <= 1 + 1.25 y.
+constexpr double kClearRate = 5.0;
+constexpr double kSecondOrder = 1.25;
+
+// A time from a gap with a margin takes four more roundings; rounded up.
+constexpr double kTimeError = 8 * kUnitRoundoff;
+
+// Edges a_i, b_j are parallel if b_j has no larger share than this of the other two edges of a, found to 7 u
+// each.  Then the axis that they make is worth nothing, and b_j is taken for its share along a_i, which is
+// off by y = 1.05 times both shares.  That moves the boxes by y f_j against each other, and it turns the
+// axes that b_j makes by 1.03 y, hence their gaps by as much of |d| + sum e_i + sum f_j: 2.2 y covers both.
+// Contact cannot begin later, nor end sooner, than for those other boxes with their slabs narrower by that
+// (if a convex body and a ball hold another, then they hold it without the ball, narrower by it).  Where the
+// edges are the same but for their sign nothing of this counts.
+constexpr double kParallel = 64 * kUnitRoundoff;
+constexpr double kShareError = 7 * kUnitRoundoff;
+constexpr double kParallelError = 2.2 * 1.05;
+
+// As polytope_first_contact.cpp has it for casts.  It keeps rates above 0.03 |w|, too, which is more than
+// what sliding within the slack is.
+constexpr double kSharp = 0x1p-44;
+constexpr double kLeastMargin = 256 * kUnitRoundoff;
+
+// The balls around two boxes: radii (1 + 3e-2)^(1/2) |e|, and (x + y)^2 <= 2 (x^2 + y^2); the product d x w
+// is off by 6 u |d| |w|, its length and the bounds by less than 10 u, which 2.08 for 2.06 and the rest cover.
+constexpr double kBallSquare = 2.08;
+constexpr double kBallError = 32 * kUnitRoundoff;
+
+struct LaneBoxes {
+    Four center, velocity;
+    Four edge[3];
+    Lanes half[3];
+};
+
+GEOMSRV_INLINE Lanes gathered(const double* const (&row)[4], std::size_t k) {
+    return Lanes(Lanes::Vector{row[0][k], row[1][k], row[2][k], row[3][k]});
+}
+GEOMSRV_INLINE Four gathered_vector(const double* const (&row)[4], std::size_t k) {
+    return {gathered(row, k), gathered(row, k + 1), gathered(row, k + 2)};
+}
+
+/// Without edges.
+GEOMSRV_INLINE void load_centers(const MovingBoxes& boxes, const std::size_t (&pair)[4], LaneBoxes& out) {
+    const double* center[4];
+    const double* half[4];
+    const double* velocity[4];
+    for (int k = 0; k < 4; ++k) {
+        center[k] = boxes.center + 3 * boxes.step * pair[k];
+        half[k] = boxes.half + 3 * boxes.step * pair[k];
+        velocity[k] = boxes.velocity + 3 * boxes.velocity_step * pair[k];
+    }
+    out.center = gathered_vector(center, 0);
+    out.velocity = gathered_vector(velocity, 0);
+    for (std::size_t i = 0; i < 3; ++i) out.half[i] = gathered(half, i);
+}
+
+GEOMSRV_INLINE void load_edges(const MovingBoxes& boxes, const std::size_t (&pair)[4], LaneBoxes& out) {
+    const double* axes[4];
+    for (int k = 0; k < 4; ++k) axes[k] = boxes.axes + 9 * boxes.step * pair[k];
+    for (std::size_t i = 0; i < 3; ++i) out.edge[i] = gathered_vector(axes, 3 * i);
+}
+
+GEOMSRV_INLINE Lanes largest_part(const Four& v) {
+    return greater(greater(magnitude(v.x), magnitude(v.y)), magnitude(v.z));
+}
+GEOMSRV_INLINE LaneMask within(const Lanes& low, const Lanes& x, const Lanes& high) {
+    return (low <= x) & (x <= high);
+}
+
+/// Sizes of a pair.
+struct LanePair {
+    Four d, w;
+    Lanes distance, speed;
+    Lanes size;   ///< |d| + sum e_i + sum f_j
+    Lanes slack;  ///< at least MovingPair::noise()
+    Lanes end;    ///< of the window; 0 if at rest to each other, since then nothing happens later
+    LaneMask ordinary;
+};
+
+GEOMSRV_INLINE LanePair pair_of(const LaneBoxes& a, const LaneBoxes& b, double t_max) {
+    LanePair out;
+    out.d = b.center - a.center;
+    out.w = b.velocity - a.velocity;
+    out.distance = square_root(dot(out.d, out.d));
+    const Lanes square = dot(out.w, out.w);
+    out.speed = square_root(square);
+    const Lanes sum_a = a.half[0] + a.half[1] + a.half[2];
+    const Lanes sum_b = b.half[0] + b.half[1] + b.half[2];
+    out.size = out.distance + (sum_a + sum_b);
+    const Lanes largest =
+        greater(largest_part(a.center), largest_part(b.center)) + Lanes(kStretch) * greater(sum_a, sum_b);
+    out.slack = lesser(Lanes(kStretch * kMostNoise) * largest, Lanes(kStretch * kLargestSlack) * out.size);
+    // Compared by parts: their squares might underflow.
+    const Lanes fastest = largest_part(out.w);
+    const LaneMask rests = fastest <= Lanes(0.0);
+    out.end = select(rests, Lanes(0.0), Lanes(t_max));
+    // For kernels that square, numbers in the middle of the range of double.
+    out.ordinary = within(kSmallestReach, out.size, kLargestReach) & (largest <= Lanes(0x1p400)) &
+                   (rests | within(kSmallestReach, fastest, kLargestReach));
+    out.speed = select(rests, Lanes(1.0), out.speed);
+    return out;
+}
+
+/// The balls around the boxes never come within the slack.
+GEOMSRV_INLINE LaneMask balls_miss(const LanePair& pair, const LaneBoxes& a, const LaneBoxes& b) {
+    const auto square = [](const Lanes(&e)[3]) __attribute__((always_inline)) {
+        return e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+    };
+    const Lanes radius = square_root(Lanes(kBallSquare) * (square(a.half) + square(b.half))) + pair.slack +
+                         Lanes(kBallError) * pair.size;
+    const Four passing = cross(pair.d, pair.w);
+    const Lanes least = radius * pair.speed;
+    const LaneMask passes = least * least < dot(passing, passing);
+    const LaneMask recedes = (Lanes(0.0) <= dot(pair.d, pair.w)) & (radius < pair.distance);
+    const LaneMask late = radius + Lanes(1.0 + kTimeError) * (pair.speed * pair.end) < pair.distance;
+    return pair.ordinary & (passes | recedes | late);
+}
+
+/// What the axes seen so far leave of the time of contact: bounds of its start and end, without the slack and
+/// for the lower bound of the start and the upper bound of the end with it, and about where they are.
+class Contact {
+public:
+    GEOMSRV_INLINE Contact(const LanePair& pair, const Lanes& parallel)
+        : rate_error_(Lanes(kRateError) * pair.speed),
+          low_margin_(Lanes(kGapError) * pair.size),
+          high_margin_(low_margin_ + parallel),
+          slack_margin_(low_margin_ + Lanes(kStretch) * pair.slack) {}
+
+    /// s = m . d, c = m . w.
+    GEOMSRV_INLINE void add(int number, const Lanes& s, const Lanes& c, const Lanes& r) {
+        const Lanes none = 0.0;
+        const Lanes least = Lanes(kClearRate) * rate_error_;
+        const Lanes rate = magnitude(c);
+        const LaneMask clear = least < rate;
+        const Lanes inverse = Lanes(1.0) / greater(rate, least);
+        const Lanes off = rate_error_ * inverse * inverse;
+        // The rate is at most so much even where it is not clear; then the bodies may close either way.
+        const Lanes low = inverse - off;
+        const Lanes high = inverse + Lanes(kSecondOrder) * off;
+        const Lanes toward = with_sign_of(c, -s);
+        const Lanes size = magnitude(s);
+        const Lanes gap = select(clear, toward, size) - r;
+        const Lanes rest = select(clear, toward, -size) + r;
+        enter_low = greater(enter_low, (gap - low_margin_) * low);
+        enter_low_slack = greater(enter_low_slack, (gap - slack_margin_) * low);
+        const Lanes late = gap + high_margin_;
+        enter_high = greater(enter_high, select(clear, late * high, select(late <= none, none, kInfinity)));
+        leave_low = lesser(leave_low, (rest - high_margin_) * low);
+        leave_high = lesser(leave_high, select(clear, (rest + low_margin_) * high, kInfinity));
+        leave_high_slack = lesser(leave_high_slack, select(clear, (rest + slack_margin_) * high, kInfinity));
+        const Lanes time = gap * inverse;
+        const LaneMask later = clear & (enter_ < time);
+        enter_ = select(later, time, enter_);
+        enter_gap = select(later, gap, enter_gap);
+        enter_rate = select(later, rate, enter_rate);
+        enter_axis = select(later, with_sign_of(c, Lanes(-1.0 - number)), enter_axis);
+        const Lanes end = rest * inverse;
+        const LaneMask sooner = clear & (end < leave_);
+        leave_ = select(sooner, end, leave_);
+        leave_rest = select(sooner, rest, leave_rest);
+        leave_rate = select(sooner, rate, leave_rate);
+        depth = lesser(depth, r - size);
+    }
+
+    Lanes enter_low = 0.0, enter_low_slack = 0.0, enter_high = 0.0;
+    Lanes leave_low = kInfinity, leave_high = kInfinity, leave_high_slack = kInfinity;
+    Lanes enter_gap = 0.0, enter_rate = 1.0;
+    Lanes enter_axis = 0.0;  ///< one more than its number, negative where the normal is opposite
+    Lanes leave_rest = kInfinity, leave_rate = 1.0;
+    Lanes depth = kInfinity;  ///< least overlap at the start
+
+    [[nodiscard]] GEOMSRV_INLINE LaneMask never(const LanePair& pair) const {
+        const Lanes start = Lanes(1.0 - kTimeError) * enter_low_slack;
+        return pair.ordinary & ((pair.end < start) | (Lanes(1.0 + kTimeError) * leave_high_slack < start));
+    }
+    [[nodiscard]] GEOMSRV_INLINE Lanes margin() const { return high_margin_; }
+    [[nodiscard]] GEOMSRV_INLINE Lanes slack_margin() const { return slack_margin_; }
+
+private:
+    Lanes rate_error_, low_margin_, high_margin_, slack_margin_;
+    Lanes enter_ = 0.0, leave_ = kInfinity;
+};
+
+/// Whether a = b or a = -b.
+GEOMSRV_INLINE LaneMask same_line(const Four& a, const Four& b) {
+    const Lanes none = 0.0;
+    const Four sum = a + b;
+    const Four difference = a - b;
+    return (largest_part(sum) <= none) | (largest_part(difference) <= none);
+}
+
+constexpr int kNext[3] = {1, 2, 0};
+constexpr int kLast[3] = {2, 0, 1};
+
+/// Four pairs; `row[k]` is where the k-th goes.
+GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b,
+                                     const std::size_t (&index)[4], double t_max,
+                                     BoxMotion* const (&row)[4]) {
+    LaneBoxes a;
+    LaneBoxes b;
+    load_centers(boxes_a, index, a);
+    load_centers(boxes_b, index, b);
+    load_edges(boxes_a, index, a);
+    load_edges(boxes_b, index, b);
+    const LanePair pair = pair_of(a, b, t_max);
+
+    Four face_a[3];
+    Four face_b[3];
+    for (int i = 0; i < 3; ++i) {
+        face_a[i] = cross(a.edge[kNext[i]], a.edge[kLast[i]]);
+        face_b[i] = cross(b.edge[kNext[i]], b.edge[kLast[i]]);
+    }
+    Lanes of_a[3][3];  // |normal i of a . edge j of b|
+    Lanes of_b[3][3];  // |normal j of b . edge i of a|, by i and j
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            of_a[i][j] = magnitude(dot(face_a[i], b.edge[j]));
+            of_b[i][j] = magnitude(dot(face_b[j], a.edge[i]));
+        }
+    }
+    LaneMask skipped[3][3];
+    LaneMask any_skipped = Lanes(1.0) < Lanes(0.0);
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            skipped[i][j] = greater(of_a[kNext[i]][j], of_a[kLast[i]][j]) <= Lanes(kParallel);
+            any_skipped = any_skipped | skipped[i][j];
+        }
+    }
+    Lanes parallel = 0.0;
+    if (any(any_skipped)) {
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) {
+                const Lanes shares = (of_a[kNext[i]][j] + of_a[kLast[i]][j]) + Lanes(2 * kShareError);
+                const LaneMask counts = skipped[i][j] & ~same_line(a.edge[i], b.edge[j]);
+                parallel = parallel + kept(counts, Lanes(kParallelError) * shares * pair.size);
+            }
+        }
+    }
+
+    Contact contact(pair, parallel);
+    const Lanes volume_a = magnitude(dot(face_a[0], a.edge[0]));
+    const Lanes volume_b = magnitude(dot(face_b[0], b.edge[0]));
+    for (int i = 0; i < 3; ++i) {
+        const Lanes r =
+            volume_a * a.half[i] + (of_a[i][0] * b.half[0] + of_a[i][1] * b.half[1] + of_a[i][2] * b.half[2]);
+        contact.add(i, dot(face_a[i], pair.d), dot(face_a[i], pair.w), r);
+    }
+    for (int j = 0; j < 3; ++j) {
+        const Lanes r =
+            volume_b * b.half[j] + (of_b[0][j] * a.half[0] + of_b[1][j] * a.half[1] + of_b[2][j] * a.half[2]);
+        contact.add(3 + j, dot(face_b[j], pair.d), dot(face_b[j], pair.w), r);
+    }
+    LaneMask never = contact.never(pair);
+    if (!all(never)) {
+        for (int i = 0; i < 3; ++i) {
+            const int i1 = kNext[i];
+            const int i2 = kLast[i];
+            const Four across = cross(pair.d, a.edge[i]);
+            const Four across_rate = cross(pair.w, a.edge[i]);
+            for (int j = 0; j < 3; ++j) {
+                const int j1 = kNext[j];
+                const int j2 = kLast[j];
+                const Lanes r = (a.half[i1] * of_a[i2][j] + a.half[i2] * of_a[i1][j]) +
+                                (b.half[j1] * of_b[i][j2] + b.half[j2] * of_b[i][j1]);
+                // An axis that is skipped is in contact for ever.
+                const Lanes s = kept(~skipped[i][j], dot(across, b.edge[j]));
+                const Lanes c = kept(~skipped[i][j], dot(across_rate, b.edge[j]));
+                contact.add(6 + 3 * i + j, s, c, select(skipped[i][j], Lanes(kInfinity), r));
+            }
+        }
+        never = contact.never(pair);
+    }
+
+    const Lanes start = Lanes(1.0 - kTimeError) * contact.enter_low;
+    const Lanes late_start = Lanes(1.0 + kTimeError) * contact.enter_high;
+    const Lanes end = Lanes(1.0 - kTimeError) * contact.leave_low;
+    const Lanes late_end = Lanes(1.0 + kTimeError) * contact.leave_high;
+    const LaneMask sharp = (late_end - end <= Lanes(kSharp) * end) & (late_start < end);
+    const LaneMask touch = pair.ordinary & sharp & (contact.slack_margin() < contact.enter_gap) &
+                           (late_start - start <= Lanes(kSharp) * late_start) & (late_start <= pair.end);
+    const Lanes deep = contact.margin() + Lanes(kStretch) * (pair.slack + Lanes(kLeastMargin) * pair.size);
+    const LaneMask overlap = pair.ordinary & sharp & (deep < contact.depth);
+    const auto value = [](BoxMotion::Verdict v) { return Lanes(static_cast<double>(v)); };
+    const Lanes verdict = select(never, value(BoxMotion::Verdict::never),
+                                 select(touch, value(BoxMotion::Verdict::will_touch),
+                                        select(overlap, value(BoxMotion::Verdict::overlapping), value({}))));
+    const Lanes time = contact.enter_gap / contact.enter_rate;
+    const Lanes last = contact.leave_rest / contact.leave_rate;
+    for (int k = 0; k < 4; ++k) {
+        BoxMotion& out = *row[k];
+        out.verdict = static_cast<BoxMotion::Verdict>(static_cast<int>(verdict[k]));
+        if (out.verdict == BoxMotion::Verdict::unclear || out.verdict == BoxMotion::Verdict::never) continue;
+        out.last_time = last[k];
+        if (out.verdict == BoxMotion::Verdict::overlapping) continue;
+        out.time = std::clamp(time[k], start[k], late_start[k]);
+        out.time_lower = start[k];
+        out.time_upper = late_start[k];
+        out.against = contact.enter_axis[k] < 0.0;
+        out.axis = static_cast<std::uint8_t>(std::fabs(contact.enter_axis[k]) - 1.0);
+    }
+}
+
+/// Verdict `never` where balls say so.
+GEOMSRV_WIDE_CLONES void test_balls(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t first,
+                                    std::size_t count, double t_max, std::int64_t* misses) {
+    for (std::size_t start = 0; start < count; start += 4) {
+        std::size_t index[4];
+        for (std::size_t k = 0; k < 4; ++k) index[k] = first + std::min(start + k, count - 1);
+        LaneBoxes a;
+        LaneBoxes b;
+        load_centers(boxes_a, index, a);
+        load_centers(boxes_b, index, b);
+        store(balls_miss(pair_of(a, b, t_max), a, b), misses + start);
+    }
+}
+
+}  // namespace
+
+void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t first, std::size_t count,
+                        double t_max, BoxMotion* out) {
+    for (std::size_t from = 0; from < count; from += kBoxMotionBlock) {
+        const std::size_t block = std::min(kBoxMotionBlock, count - from);
+        std::int64_t misses[kBoxMotionBlock];
+        std::size_t left[kBoxMotionBlock];
+        std::size_t many = 0;
+        test_balls(a, b, first + from, block, t_max, misses);
+        for (std::size_t k = 0; k < block; ++k) {
+            out[from + k].verdict = BoxMotion::Verdict::never;
+            left[many] = from + k;
+            many += misses[k] == 0 ? 1 : 0;
+        }
+        for (std::size_t start = 0; start < many; start += 4) {
+            std::size_t index[4];
+            BoxMotion* row[4];
+            for (std::size_t k = 0; k < 4; ++k) {
+                const std::size_t which = left[std::min(start + k, many - 1)];
+                index[k] = first + which;
+                row[k] = out + which;
+            }
+            decide_four(a, b, index, t_max, row);
+        }
+    }
+}
+
+}  // namespace geomsrv
