@@ -160,7 +160,7 @@ std::vector<Vec3> first_contacts(const MovingBodies& a, const MovingBodies& b, s
         }
         const MovingBody body_a = a[i];
         const MovingBody body_b = b[i];
-        const PolytopeContact contact = [&] {
+        const PolytopeContact contact = [&]() {
             if constexpr (std::is_same_v<Solver, PolytopeContactSolver>) {
                 if (by_axes) return solver.solve(body_a, body_b, t_max, contact_set, known[place]);
             }

@@ -10,8 +10,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
+#include <utility>
 
 #include "geom/core.hpp"
+#include "geom/double_double.hpp"
 #include "geom/exact_body.hpp"
 #include "geom/lanes.hpp"
 #include "geom/moving_pair.hpp"
@@ -24,6 +27,7 @@ namespace {
 using Four = VectorOf<Lanes>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Edges are perpendicular unit vectors but for 1e-2 in each of their products: they are no longer than 1.005,
 // and so is r, in terms of the half extents, than 1.02.
@@ -69,6 +73,13 @@ constexpr double kParallelError = 2.2 * 1.05;
 // what sliding within the slack is.
 constexpr double kSharp = 0x1p-44;
 constexpr double kLeastMargin = 256 * kUnitRoundoff;
+
+// In double-double a gap and a rate are off by 14 of its roundings, of terms that are at most sqrt(2) times
+// as large as kGapError has them.
+constexpr double kWideGapError = 32 * kWideRoundoff;
+
+// With less than this of a relative error, a quotient rounded to double is within an ulp of the time.
+constexpr double kWideSharp = 0x1p-60;
 
 // The balls around two boxes: radii (1 + 3e-2)^(1/2) |e|, and (x + y)^2 <= 2 (x^2 + y^2); the product d x w
 // is off by 6 u |d| |w|, its length and the bounds by less than 10 u, which 2.08 for 2.06 and the rest cover.
@@ -165,40 +176,41 @@ GEOMSRV_INLINE LaneMask balls_miss(const LanePair& pair, const LaneBoxes& a, con
     return pair.ordinary & (passes | recedes | late);
 }
 
-/// What the axes seen so far leave of the time of contact: bounds of its start and end, without the slack and
-/// for the lower bound of the start and the upper bound of the end with it, and about where they are.
+constexpr int kAxes = 15;
+
+/// What the axes seen so far leave of the time of contact.  A bound from one axis alone holds for all where
+/// that axis makes contact shorter: it does not begin before any axis lets it, nor end after.
 class Contact {
 public:
     GEOMSRV_INLINE Contact(const LanePair& pair, const Lanes& parallel)
         : rate_error_(Lanes(kRateError) * pair.speed),
-          low_margin_(Lanes(kGapError) * pair.size),
-          high_margin_(low_margin_ + parallel),
-          slack_margin_(low_margin_ + Lanes(kStretch) * pair.slack) {}
+          margin_(Lanes(kGapError) * pair.size),
+          wide_margin_(margin_ + parallel) {}
 
     /// s = m . d, c = m . w.
     GEOMSRV_INLINE void add(int number, const Lanes& s, const Lanes& c, const Lanes& r) {
         const Lanes none = 0.0;
         const Lanes least = Lanes(kClearRate) * rate_error_;
-        const Lanes rate = magnitude(c);
-        const LaneMask clear = least < rate;
-        const Lanes inverse = Lanes(1.0) / greater(rate, least);
-        const Lanes off = rate_error_ * inverse * inverse;
-        // The rate is at most so much even where it is not clear; then the bodies may close either way.
-        const Lanes low = inverse - off;
-        const Lanes high = inverse + Lanes(kSecondOrder) * off;
-        const Lanes toward = with_sign_of(c, -s);
         const Lanes size = magnitude(s);
+        const Lanes speed = magnitude(c);
+        const LaneMask clear = least < speed;
+        // Where the rate is not clear it is less than this, and the bodies may close either way.
+        const Lanes rate = greater(speed, least);
+        const Lanes inverse = Lanes(1.0) / rate;
+        const Lanes off = rate_error_ * inverse * inverse;
+        const Lanes toward = with_sign_of(c, -s);
         const Lanes gap = select(clear, toward, size) - r;
+        const Lanes late = gap + wide_margin_;
+        const Lanes latest = select(clear, late * (inverse + Lanes(kSecondOrder) * off),
+                                    select(late <= none, none, kInfinity));
+        enter_high_of[number] = latest;
+        enter_high = greater(enter_high, latest);
         const Lanes rest = select(clear, toward, -size) + r;
-        enter_low = greater(enter_low, (gap - low_margin_) * low);
-        enter_low_slack = greater(enter_low_slack, (gap - slack_margin_) * low);
-        const Lanes late = gap + high_margin_;
-        enter_high = greater(enter_high, select(clear, late * high, select(late <= none, none, kInfinity)));
-        leave_low = lesser(leave_low, (rest - high_margin_) * low);
-        leave_high = lesser(leave_high, select(clear, (rest + low_margin_) * high, kInfinity));
-        leave_high_slack = lesser(leave_high_slack, select(clear, (rest + slack_margin_) * high, kInfinity));
+        const Lanes soonest = (rest - wide_margin_) * (inverse - off);
+        leave_low_of[number] = soonest;
+        leave_low = lesser(leave_low, soonest);
         const Lanes time = gap * inverse;
-        const LaneMask later = clear & (enter_ < time);
+        const LaneMask later = enter_ < time;
         enter_ = select(later, time, enter_);
         enter_gap = select(later, gap, enter_gap);
         enter_rate = select(later, rate, enter_rate);
@@ -208,25 +220,40 @@ public:
         leave_ = select(sooner, end, leave_);
         leave_rest = select(sooner, rest, leave_rest);
         leave_rate = select(sooner, rate, leave_rate);
+        leave_axis = select(sooner, with_sign_of(c, Lanes(-1.0 - number)), leave_axis);
         depth = lesser(depth, r - size);
     }
 
-    Lanes enter_low = 0.0, enter_low_slack = 0.0, enter_high = 0.0;
-    Lanes leave_low = kInfinity, leave_high = kInfinity, leave_high_slack = kInfinity;
-    Lanes enter_gap = 0.0, enter_rate = 1.0;
-    Lanes enter_axis = 0.0;  ///< one more than its number, negative where the normal is opposite
+    Lanes enter_high = 0.0, leave_low = kInfinity;  ///< proven by all
+    Lanes enter_high_of[kAxes], leave_low_of[kAxes];
+    Lanes enter_gap = 0.0, enter_rate = 1.0;  ///< of the axis with the latest entry
     Lanes leave_rest = kInfinity, leave_rate = 1.0;
-    Lanes depth = kInfinity;  ///< least overlap at the start
+    Lanes enter_axis = 0.0, leave_axis = 0.0;  ///< its number and one, negative where the normal is opposite
+    Lanes depth = kInfinity;                   ///< least overlap at the start
 
-    [[nodiscard]] GEOMSRV_INLINE LaneMask never(const LanePair& pair) const {
-        const Lanes start = Lanes(1.0 - kTimeError) * enter_low_slack;
-        return pair.ordinary & ((pair.end < start) | (Lanes(1.0 + kTimeError) * leave_high_slack < start));
+    /// Proven by those axes: where the gaps are off by that much.
+    [[nodiscard]] GEOMSRV_INLINE Lanes enter_low(const Lanes& margin) const {
+        const Lanes inverse = Lanes(1.0) / enter_rate;
+        return greater(Lanes(0.0), (enter_gap - margin) * (inverse - rate_error_ * inverse * inverse));
     }
-    [[nodiscard]] GEOMSRV_INLINE Lanes margin() const { return high_margin_; }
-    [[nodiscard]] GEOMSRV_INLINE Lanes slack_margin() const { return slack_margin_; }
+    [[nodiscard]] GEOMSRV_INLINE Lanes leave_high(const Lanes& margin) const {
+        const Lanes inverse = Lanes(1.0) / leave_rate;
+        return (leave_rest + margin) * (inverse + Lanes(kSecondOrder) * (rate_error_ * inverse * inverse));
+    }
+    [[nodiscard]] GEOMSRV_INLINE LaneMask never(const LanePair& pair) const {
+        const Lanes margin = slack_margin(pair);
+        const Lanes start = Lanes(1.0 - kTimeError) * enter_low(margin);
+        return pair.ordinary &
+               ((pair.end < start) | (Lanes(1.0 + kTimeError) * leave_high(margin) < start));
+    }
+    [[nodiscard]] GEOMSRV_INLINE Lanes slack_margin(const LanePair& pair) const {
+        return margin_ + Lanes(kStretch) * pair.slack;
+    }
+    [[nodiscard]] GEOMSRV_INLINE Lanes margin() const { return margin_; }
+    [[nodiscard]] GEOMSRV_INLINE Lanes wide_margin() const { return wide_margin_; }
 
 private:
-    Lanes rate_error_, low_margin_, high_margin_, slack_margin_;
+    Lanes rate_error_, margin_, wide_margin_;
     Lanes enter_ = 0.0, leave_ = kInfinity;
 };
 
@@ -240,6 +267,91 @@ GEOMSRV_INLINE LaneMask same_line(const Four& a, const Four& b) {
 
 constexpr int kNext[3] = {1, 2, 0};
 constexpr int kLast[3] = {2, 0, 1};
+
+/// A pair of which doubles know that it meets, but not well enough when.
+struct Refinement {
+    const Contact& contact;
+    int lane;
+    double size;
+    double speed;
+};
+
+/// The gap along an axis and the rate at which it closes, in double-double.
+struct WideGap {
+    DoubleDouble gap, rest, rate;
+};
+
+WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t pair, int axis,
+                 bool against) {
+    const auto vector = [](const double* row) { return Vec3{row[0], row[1], row[2]}; };
+    const double* const edges_a = boxes_a.axes + 9 * boxes_a.step * pair;
+    const double* const edges_b = boxes_b.axes + 9 * boxes_b.step * pair;
+    const double* const half_a = boxes_a.half + 3 * boxes_a.step * pair;
+    const double* const half_b = boxes_b.half + 3 * boxes_b.step * pair;
+    const auto [first, i, second, j] = [&]() -> std::tuple<const double*, int, const double*, int> {
+        if (axis >= 6) return {edges_a, (axis - 6) / 3, edges_b, (axis - 6) % 3};
+        const double* const edges = axis < 3 ? edges_a : edges_b;
+        return {edges, kNext[axis % 3], edges, kLast[axis % 3]};
+    }();
+    const WideVec3 m = cross(widen(vector(first + 3 * i)), widen(vector(second + 3 * j)));
+    const WideVec3 d = exact_difference(vector(boxes_b.center + 3 * boxes_b.step * pair),
+                                        vector(boxes_a.center + 3 * boxes_a.step * pair));
+    const WideVec3 w = exact_difference(vector(boxes_b.velocity + 3 * boxes_b.velocity_step * pair),
+                                        vector(boxes_a.velocity + 3 * boxes_a.velocity_step * pair));
+    DoubleDouble r;
+    for (int k = 0; k < 3; ++k) {
+        for (const auto& [edges, half] : {std::pair(edges_a, half_a), std::pair(edges_b, half_b)}) {
+            const DoubleDouble along = dot(m, vector(edges + 3 * k));
+            r = r + (along.hi < 0.0 ? -along : along) * half[k];
+        }
+    }
+    const DoubleDouble s = against ? -dot(m, d) : dot(m, d);
+    const DoubleDouble c = against ? -dot(m, w) : dot(m, w);
+    return {s - r, s + r, -c};
+}
+
+/// Rounded to nearest but for a hair; NaN where rounding may have done more.
+double wide_time(DoubleDouble gap, DoubleDouble rate, const Refinement& axes) {
+    const bool useful = gap.hi > 0.0 && rate.hi > kStretch * kLargestSlack * axes.speed &&
+                        kWideGapError * (axes.size / gap.hi + axes.speed / rate.hi) <= kWideSharp;
+    return useful ? quotient(gap, rate).hi : kNaN;
+}
+
+/// The start of contact from double-double; false where that is no use, or another axis comes in between.
+bool refine_start(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, const Refinement& axes,
+                  BoxMotion& out) {
+    const WideGap wide = wide_gap(a, b, pair, out.axis, out.against);
+    const double latest = out.time_upper;
+    out.wide = true;
+    out.time = wide_time(wide.gap, wide.rate, axes);
+    if (!(out.time < kInfinity)) return false;
+    out.time_lower = next_down(out.time);
+    out.time_upper = next_up(out.time);
+    bool sure = out.time_upper <= latest;
+    for (int k = 0; k < kAxes; ++k) {
+        const double other = (1.0 + kTimeError) * axes.contact.enter_high_of[k][axes.lane];
+        sure = sure && (k == out.axis || other <= out.time_lower);
+    }
+    return sure;
+}
+
+/// Likewise its end.
+bool refine_end(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, const Refinement& axes,
+                BoxMotion& out) {
+    const double sign = axes.contact.leave_axis[axes.lane];
+    const int axis = static_cast<int>(std::fabs(sign)) - 1;
+    if (axis < 0) return false;
+    const WideGap wide = wide_gap(a, b, pair, axis, sign < 0.0);
+    out.wide = true;
+    out.last_time = wide_time(wide.rest, wide.rate, axes);
+    if (!(out.last_time < kInfinity)) return false;
+    bool sure = true;
+    for (int k = 0; k < kAxes; ++k) {
+        const double other = (1.0 - kTimeError) * axes.contact.leave_low_of[k][axes.lane];
+        sure = sure && (k == axis || next_up(out.last_time) <= other);
+    }
+    return sure;
+}
 
 /// Four pairs; `row[k]` is where the k-th goes.
 GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b,
@@ -320,32 +432,41 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
         never = contact.never(pair);
     }
 
-    const Lanes start = Lanes(1.0 - kTimeError) * contact.enter_low;
+    const Lanes start = Lanes(1.0 - kTimeError) * contact.enter_low(contact.margin());
     const Lanes late_start = Lanes(1.0 + kTimeError) * contact.enter_high;
     const Lanes end = Lanes(1.0 - kTimeError) * contact.leave_low;
-    const Lanes late_end = Lanes(1.0 + kTimeError) * contact.leave_high;
-    const LaneMask sharp = (late_end - end <= Lanes(kSharp) * end) & (late_start < end);
-    const LaneMask touch = pair.ordinary & sharp & (contact.slack_margin() < contact.enter_gap) &
-                           (late_start - start <= Lanes(kSharp) * late_start) & (late_start <= pair.end);
-    const Lanes deep = contact.margin() + Lanes(kStretch) * (pair.slack + Lanes(kLeastMargin) * pair.size);
-    const LaneMask overlap = pair.ordinary & sharp & (deep < contact.depth);
+    const Lanes late_end = Lanes(1.0 + kTimeError) * contact.leave_high(contact.margin());
+    const LaneMask sharp_end = late_end - end <= Lanes(kSharp) * end;
+    const LaneMask sharp_start = late_start - start <= Lanes(kSharp) * late_start;
+    const LaneMask meet = pair.ordinary & (late_start < end) & (late_start <= pair.end);
+    const LaneMask touch = meet & (contact.slack_margin(pair) < contact.enter_gap);
+    const Lanes deep =
+        contact.wide_margin() + Lanes(kStretch) * (pair.slack + Lanes(kLeastMargin) * pair.size);
+    const LaneMask overlap = meet & (deep < contact.depth);
     const auto value = [](BoxMotion::Verdict v) { return Lanes(static_cast<double>(v)); };
     const Lanes verdict = select(never, value(BoxMotion::Verdict::never),
                                  select(touch, value(BoxMotion::Verdict::will_touch),
                                         select(overlap, value(BoxMotion::Verdict::overlapping), value({}))));
+    const Lanes blunt_start = select(sharp_start | overlap, Lanes(0.0), Lanes(1.0));
+    const Lanes blunt_end = select(sharp_end, Lanes(0.0), Lanes(1.0));
     const Lanes time = contact.enter_gap / contact.enter_rate;
     const Lanes last = contact.leave_rest / contact.leave_rate;
     for (int k = 0; k < 4; ++k) {
         BoxMotion& out = *row[k];
         out.verdict = static_cast<BoxMotion::Verdict>(static_cast<int>(verdict[k]));
         if (out.verdict == BoxMotion::Verdict::unclear || out.verdict == BoxMotion::Verdict::never) continue;
+        out.wide = false;
         out.last_time = last[k];
-        if (out.verdict == BoxMotion::Verdict::overlapping) continue;
         out.time = std::clamp(time[k], start[k], late_start[k]);
         out.time_lower = start[k];
         out.time_upper = late_start[k];
         out.against = contact.enter_axis[k] < 0.0;
-        out.axis = static_cast<std::uint8_t>(std::fabs(contact.enter_axis[k]) - 1.0);
+        out.axis = static_cast<std::uint8_t>(std::max(std::fabs(contact.enter_axis[k]) - 1.0, 0.0));
+        const Refinement axes = {contact, k, parallel[k] == 0.0 ? pair.size[k] : kInfinity, pair.speed[k]};
+        if ((blunt_start[k] != 0.0 && !refine_start(boxes_a, boxes_b, index[k], axes, out)) ||
+            (blunt_end[k] != 0.0 && !refine_end(boxes_a, boxes_b, index[k], axes, out))) {
+            out.verdict = BoxMotion::Verdict::unclear;
+        }
     }
 }
 

@@ -179,25 +179,33 @@ double turn_of(const MovingPair& pair, double width) {
     return width > 0.0 ? std::min(pair.noise() / width, kLargestSlack) : kLargestSlack;
 }
 
-/// A facet of K of two boxes: unit normal, and width as of Limit.
-struct BoxFacet {
-    Vec3 normal;
-    double width;
-};
+/// A facet of K of two boxes, by the number of its axis in BoxMotion.
+class BoxFacet {
+public:
+    BoxFacet(const ExactBody& a, const ExactBody& b, int axis) {
+        const bool edges = axis >= 6;
+        const ExactBody& first = axis < 3 || edges ? a : b;
+        const ExactBody& second = edges ? b : first;
+        const int i = edges ? (axis - 6) / 3 : (axis + 1) % 3;
+        const int j = edges ? (axis - 6) % 3 : (axis + 2) % 3;
+        product_ = cross(first.axis[i], second.axis[j]);
+        size_ = norm(product_);
+        half_[0] = first.half[i];
+        half_[1] = second.half[j];
+    }
+    [[nodiscard]] Vec3 normal() const { return (1.0 / size_) * product_; }
+    /// As of Limit: of the triangle with two edges of the facet, which are about perpendicular or make it
+    /// slender.
+    [[nodiscard]] double width() const {
+        const auto [e, f] = half_;
+        return e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * size_ : 0.0;
+    }
 
-BoxFacet facet_of(const ExactBody& a, const ExactBody& b, int axis) {
-    const bool edges = axis >= 6;
-    const ExactBody& first = axis < 3 || edges ? a : b;
-    const ExactBody& second = edges ? b : first;
-    const int i = edges ? (axis - 6) / 3 : (axis + 1) % 3;
-    const int j = edges ? (axis - 6) % 3 : (axis + 2) % 3;
-    const Vec3 product = cross(first.axis[i], second.axis[j]);
-    const double size = norm(product);
-    const double e = first.half[i];
-    const double f = second.half[j];
-    // Of the triangle with the edges 2 e and 2 f; they are about perpendicular, or the facet is slender.
-    return {(1.0 / size) * product, e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * size : 0.0};
-}
+private:
+    Vec3 product_;
+    double size_;
+    double half_[2];
+};
 
 /// Contact within the slack.
 class Nearly {
@@ -401,24 +409,25 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     if (known.verdict == BoxMotion::Verdict::unclear) {
         return solve(a, b, t_max, contact_set);
     }
-    PolytopeContact out = never(true, Rung::filter);
+    PolytopeContact out = never(true, known.wide ? Rung::wide : Rung::filter);
     out.last_time = std::min(known.last_time, t_max);
     double width = 0.0;
     if (overlaps) {
         out.status = ContactStatus::overlapping;
         out.time = out.time_lower = out.time_upper = 0.0;
     } else {
-        const BoxFacet facet = facet_of(a.body, b.body, known.axis);
-        if (contact_set && !(facet.width > 0.0)) {
+        const BoxFacet facet(a.body, b.body, known.axis);
+        width = contact_set ? facet.width() : 0.0;
+        if (contact_set && !(width > 0.0)) {
             return solve(a, b, t_max, contact_set);
         }
-        width = facet.width;
+        const Vec3 normal = facet.normal();
         out.status = ContactStatus::will_touch;
         out.time = known.time;
         out.time_lower = known.time_lower;
         out.time_upper = known.time_upper;
         // No zero of the wrong sign.
-        out.normal = (known.against ? -facet.normal : facet.normal) + Vec3{};
+        out.normal = (known.against ? -normal : normal) + Vec3{};
         out.closing_speed = -dot(out.normal, b.velocity - a.velocity);
     }
     if (contact_set) {
