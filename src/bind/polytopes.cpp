@@ -158,13 +158,15 @@ std::vector<Vec3> first_contacts(const MovingBodies& a, const MovingBodies& b, s
             decide_box_motions(a.rows(), b.rows(), i, std::min(count - i, kBoxMotionBlock), t_max,
                                known.data());
         }
-        const MovingBody body_a = a[i];
-        const MovingBody body_b = b[i];
-        const PolytopeContact contact = [&]() {
+        const PolytopeContact contact = [&] {
             if constexpr (std::is_same_v<Solver, PolytopeContactSolver>) {
-                if (by_axes) return solver.solve(body_a, body_b, t_max, contact_set, known[place]);
+                if (by_axes && known[place].verdict != BoxMotion::Verdict::unclear) {
+                    const bool meet = known[place].verdict != BoxMotion::Verdict::never;
+                    return contact_set && meet ? solver.solve(a[i], b[i], t_max, known[place])
+                                               : contact_of(known[place], t_max);
+                }
             }
-            return solver.solve(body_a, body_b, t_max, contact_set);
+            return solver.solve(a[i], b[i], t_max, contact_set);
         }();
         rows.set(i, contact);
         points.insert(points.end(), contact.points.begin(), contact.points.end());

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include "geom/core.hpp"
@@ -281,6 +280,25 @@ struct WideGap {
     DoubleDouble gap, rest, rate;
 };
 
+/// The edges whose product an axis is.
+struct AxisEdges {
+    Vec3 first, second;
+    double half[2];
+};
+
+GEOMSRV_INLINE AxisEdges edges_of(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, int axis) {
+    const bool crossed = axis >= 6;
+    const MovingBoxes& one = axis < 3 || crossed ? a : b;
+    const MovingBoxes& other = crossed ? b : one;
+    const auto i = static_cast<std::size_t>(crossed ? (axis - 6) / 3 : kNext[axis % 3]);
+    const auto j = static_cast<std::size_t>(crossed ? (axis - 6) % 3 : kLast[axis % 3]);
+    const double* const p = one.axes + 9 * one.step * pair + 3 * i;
+    const double* const q = other.axes + 9 * other.step * pair + 3 * j;
+    return {{p[0], p[1], p[2]},
+            {q[0], q[1], q[2]},
+            {one.half[3 * one.step * pair + i], other.half[3 * other.step * pair + j]}};
+}
+
 WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t pair, int axis,
                  bool against) {
     const auto vector = [](const double* row) { return Vec3{row[0], row[1], row[2]}; };
@@ -288,12 +306,8 @@ WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::si
     const double* const edges_b = boxes_b.axes + 9 * boxes_b.step * pair;
     const double* const half_a = boxes_a.half + 3 * boxes_a.step * pair;
     const double* const half_b = boxes_b.half + 3 * boxes_b.step * pair;
-    const auto [first, i, second, j] = [&]() -> std::tuple<const double*, int, const double*, int> {
-        if (axis >= 6) return {edges_a, (axis - 6) / 3, edges_b, (axis - 6) % 3};
-        const double* const edges = axis < 3 ? edges_a : edges_b;
-        return {edges, kNext[axis % 3], edges, kLast[axis % 3]};
-    }();
-    const WideVec3 m = cross(widen(vector(first + 3 * i)), widen(vector(second + 3 * j)));
+    const AxisEdges made_of = edges_of(boxes_a, boxes_b, pair, axis);
+    const WideVec3 m = cross(widen(made_of.first), widen(made_of.second));
     const WideVec3 d = exact_difference(vector(boxes_b.center + 3 * boxes_b.step * pair),
                                         vector(boxes_a.center + 3 * boxes_a.step * pair));
     const WideVec3 w = exact_difference(vector(boxes_b.velocity + 3 * boxes_b.velocity_step * pair),
@@ -451,11 +465,11 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
     const Lanes blunt_end = select(sharp_end, Lanes(0.0), Lanes(1.0));
     const Lanes time = contact.enter_gap / contact.enter_rate;
     const Lanes last = contact.leave_rest / contact.leave_rate;
+    double product[3][4] = {};
     for (int k = 0; k < 4; ++k) {
         BoxMotion& out = *row[k];
         out.verdict = static_cast<BoxMotion::Verdict>(static_cast<int>(verdict[k]));
         if (out.verdict == BoxMotion::Verdict::unclear || out.verdict == BoxMotion::Verdict::never) continue;
-        out.wide = false;
         out.last_time = last[k];
         out.time = std::clamp(time[k], start[k], late_start[k]);
         out.time_lower = start[k];
@@ -467,6 +481,27 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
             (blunt_end[k] != 0.0 && !refine_end(boxes_a, boxes_b, index[k], axes, out))) {
             out.verdict = BoxMotion::Verdict::unclear;
         }
+        const AxisEdges edges = edges_of(boxes_a, boxes_b, index[k], out.axis);
+        const Vec3 p = out.against ? edges.second : edges.first;
+        const Vec3 q = out.against ? edges.first : edges.second;
+        product[0][k] = p.y * q.z - p.z * q.y;
+        product[1][k] = p.z * q.x - p.x * q.z;
+        product[2][k] = p.x * q.y - p.y * q.x;
+        out.half[0] = edges.half[0];
+        out.half[1] = edges.half[1];
+    }
+    Four normal = {Lanes::load(product[0]), Lanes::load(product[1]), Lanes::load(product[2])};
+    const Lanes size = square_root(dot(normal, normal));
+    // The sum leaves no zero of the wrong sign.
+    const Lanes none = 0.0;
+    normal = {normal.x / size + none, normal.y / size + none, normal.z / size + none};
+    const Lanes closing = none - dot(normal, pair.w);
+    for (int k = 0; k < 4; ++k) {
+        BoxMotion& out = *row[k];
+        if (out.verdict != BoxMotion::Verdict::will_touch) continue;
+        out.normal = {normal.x[k], normal.y[k], normal.z[k]};
+        out.closing_speed = closing[k];
+        out.sine = size[k];
     }
 }
 
@@ -496,6 +531,7 @@ void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t 
         test_balls(a, b, first + from, block, t_max, misses);
         for (std::size_t k = 0; k < block; ++k) {
             out[from + k].verdict = BoxMotion::Verdict::never;
+            out[from + k].wide = false;
             left[many] = from + k;
             many += misses[k] == 0 ? 1 : 0;
         }

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "geom/vec.hpp"
+
 namespace geomsrv {
 
 /// Boxes of a batch as rows of doubles, and their velocities; steps are 0 where one serves every pair.
@@ -32,11 +34,15 @@ struct BoxMotion {
     Verdict verdict = Verdict::unclear;
     std::uint8_t axis = 0;  ///< of first contact: 0-2 faces of a, 3-5 of b, 6 + 3 i + j edges i of a, j of b
     bool against = false;   ///< the normal is opposite to the product of the edges of that axis
-    bool wide = false;  ///< it took double-double to tell the times
+    bool wide = false;      ///< it took double-double to tell the times
     double time = 0.0;      ///< [s]
-    double time_lower = 0.0;  ///< the exact time is not earlier,
-    double time_upper = 0.0;  ///< and not later
-    double last_time = 0.0;   ///< [s], whatever the window
+    double time_lower = 0.0;     ///< the exact time is not earlier,
+    double time_upper = 0.0;     ///< and not later
+    double last_time = 0.0;      ///< [s], whatever the window
+    Vec3 normal;                 ///< unit, from a to b, if they will touch
+    double closing_speed = 0.0;  ///< [m/s], along the normal
+    double half[2] = {};         ///< half lengths of the edges of that axis,
+    double sine = 0.0;           ///< and the length of the product of their directions
 };
 
 /// Pairs `first` to `first + count`.

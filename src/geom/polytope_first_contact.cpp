@@ -179,33 +179,11 @@ double turn_of(const MovingPair& pair, double width) {
     return width > 0.0 ? std::min(pair.noise() / width, kLargestSlack) : kLargestSlack;
 }
 
-/// A facet of K of two boxes, by the number of its axis in BoxMotion.
-class BoxFacet {
-public:
-    BoxFacet(const ExactBody& a, const ExactBody& b, int axis) {
-        const bool edges = axis >= 6;
-        const ExactBody& first = axis < 3 || edges ? a : b;
-        const ExactBody& second = edges ? b : first;
-        const int i = edges ? (axis - 6) / 3 : (axis + 1) % 3;
-        const int j = edges ? (axis - 6) % 3 : (axis + 2) % 3;
-        product_ = cross(first.axis[i], second.axis[j]);
-        size_ = norm(product_);
-        half_[0] = first.half[i];
-        half_[1] = second.half[j];
-    }
-    [[nodiscard]] Vec3 normal() const { return (1.0 / size_) * product_; }
-    /// As of Limit: of the triangle with two edges of the facet, which are about perpendicular or make it
-    /// slender.
-    [[nodiscard]] double width() const {
-        const auto [e, f] = half_;
-        return e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * size_ : 0.0;
-    }
-
-private:
-    Vec3 product_;
-    double size_;
-    double half_[2];
-};
+/// Least height of the triangle of two edges of the facet; they are about perpendicular, or make it slender.
+double width_of(const BoxMotion& motion) {
+    const auto [e, f] = motion.half;
+    return e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * motion.sine : 0.0;
+}
 
 /// Contact within the slack.
 class Nearly {
@@ -400,40 +378,36 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     return out;
 }
 
-PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
-                                             bool contact_set, const BoxMotion& known) {
-    const bool overlaps = known.verdict == BoxMotion::Verdict::overlapping;
-    if (known.verdict == BoxMotion::Verdict::never) {
-        return never(true, Rung::filter);
+PolytopeContact contact_of(const BoxMotion& motion, double t_max) {
+    PolytopeContact out = never(true, motion.wide ? Rung::wide : Rung::filter);
+    if (motion.verdict == BoxMotion::Verdict::never) {
+        return out;
     }
-    if (known.verdict == BoxMotion::Verdict::unclear) {
-        return solve(a, b, t_max, contact_set);
-    }
-    PolytopeContact out = never(true, known.wide ? Rung::wide : Rung::filter);
-    out.last_time = std::min(known.last_time, t_max);
-    double width = 0.0;
-    if (overlaps) {
+    out.last_time = std::min(motion.last_time, t_max);
+    if (motion.verdict == BoxMotion::Verdict::overlapping) {
         out.status = ContactStatus::overlapping;
         out.time = out.time_lower = out.time_upper = 0.0;
-    } else {
-        const BoxFacet facet(a.body, b.body, known.axis);
-        width = contact_set ? facet.width() : 0.0;
-        if (contact_set && !(width > 0.0)) {
-            return solve(a, b, t_max, contact_set);
-        }
-        const Vec3 normal = facet.normal();
-        out.status = ContactStatus::will_touch;
-        out.time = known.time;
-        out.time_lower = known.time_lower;
-        out.time_upper = known.time_upper;
-        // No zero of the wrong sign.
-        out.normal = (known.against ? -normal : normal) + Vec3{};
-        out.closing_speed = -dot(out.normal, b.velocity - a.velocity);
+        return out;
     }
-    if (contact_set) {
-        pair_.load(a, b);
-        add_points(out.time, width, out);
+    out.status = ContactStatus::will_touch;
+    out.time = motion.time;
+    out.time_lower = motion.time_lower;
+    out.time_upper = motion.time_upper;
+    out.normal = motion.normal;
+    out.closing_speed = motion.closing_speed;
+    return out;
+}
+
+PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
+                                             const BoxMotion& known) {
+    PolytopeContact out = contact_of(known, t_max);
+    const bool touches = out.status == ContactStatus::will_touch;
+    const double width = touches ? width_of(known) : 0.0;
+    if (touches && !(width > 0.0)) {
+        return solve(a, b, t_max, true);
     }
+    pair_.load(a, b);
+    add_points(out.time, width, out);
     return out;
 }
 

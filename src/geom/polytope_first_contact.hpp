@@ -32,6 +32,9 @@ struct PolytopeContact {
     Rung rung = Rung::filter;
 };
 
+/// What is known from the axes of two boxes, unless that is unclear; without points.
+PolytopeContact contact_of(const BoxMotion& motion, double t_max);
+
 /// Holds scratch memory for polytopes of at most so many vertices.
 class PolytopeContactSolver {
 public:
@@ -40,9 +43,8 @@ public:
     /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
     PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set);
 
-    /// The same of boxes of which the axes have been asked.
-    PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set,
-                          const BoxMotion& known);
+    /// The same, with a contact set, of boxes that are known to meet.
+    PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, const BoxMotion& known);
 
 private:
     /// Points of contact, `moment` after the start; `width` as of Limit.
