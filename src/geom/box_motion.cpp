@@ -177,8 +177,7 @@ GEOMSRV_INLINE LaneMask balls_miss(const LanePair& pair, const LaneBoxes& a, con
 
 constexpr int kAxes = 15;
 
-/// What the axes seen so far leave of the time of contact.  A bound from one axis alone holds for all where
-/// that axis makes contact shorter: it does not begin before any axis lets it, nor end after.
+/// What the axes seen so far leave of the time of contact.
 class Contact {
 public:
     GEOMSRV_INLINE Contact(const LanePair& pair, const Lanes& parallel)
@@ -186,74 +185,80 @@ public:
           margin_(Lanes(kGapError) * pair.size),
           wide_margin_(margin_ + parallel) {}
 
-    /// s = m . d, c = m . w.
+    /// s = m . d, c = m . w.  Not `Careful`, it is worth nothing where a rate is not clear.
+    template <bool Careful>
     GEOMSRV_INLINE void add(int number, const Lanes& s, const Lanes& c, const Lanes& r) {
         const Lanes none = 0.0;
         const Lanes least = Lanes(kClearRate) * rate_error_;
-        const Lanes size = magnitude(s);
-        const Lanes speed = magnitude(c);
-        const LaneMask clear = least < speed;
-        // Where the rate is not clear it is less than this, and the bodies may close either way.
-        const Lanes rate = greater(speed, least);
-        const Lanes inverse = Lanes(1.0) / rate;
-        const Lanes off = rate_error_ * inverse * inverse;
         const Lanes toward = with_sign_of(c, -s);
-        const Lanes gap = select(clear, toward, size) - r;
-        const Lanes late = gap + wide_margin_;
-        const Lanes latest = select(clear, late * (inverse + Lanes(kSecondOrder) * off),
-                                    select(late <= none, none, kInfinity));
-        enter_high_of[number] = latest;
+        Lanes rate = magnitude(c);
+        Lanes gap = toward - r;
+        Lanes rest = toward + r;
+        const LaneMask clear = least < rate;
+        if constexpr (Careful) {
+            // It is less than that where it is not clear, and the bodies may close either way.
+            rate = greater(rate, least);
+            gap = select(clear, gap, magnitude(s) - r);
+            rest = select(clear, rest, r - magnitude(s));
+        } else {
+            clear_ = clear_ & clear;
+        }
+        const Lanes inverse = Lanes(1.0) / rate;
+        const Lanes off = Lanes(kSecondOrder) * rate_error_ * inverse;
+        Lanes latest = (gap + wide_margin_) * inverse * (Lanes(1.0) + off);
+        const Lanes soonest = (rest - wide_margin_) * inverse * (Lanes(1.0) - off);
+        if constexpr (Careful) {
+            latest = select(clear, latest, select(gap + wide_margin_ <= none, none, kInfinity));
+        }
+        const Lanes that = static_cast<double>(number);
+        enter_axis = select(enter_high < latest, that, enter_axis);
         enter_high = greater(enter_high, latest);
-        const Lanes rest = select(clear, toward, -size) + r;
-        const Lanes soonest = (rest - wide_margin_) * (inverse - off);
-        leave_low_of[number] = soonest;
+        leave_axis = select(soonest < leave_low, that, leave_axis);
         leave_low = lesser(leave_low, soonest);
-        const Lanes time = gap * inverse;
-        const LaneMask later = enter_ < time;
-        enter_ = select(later, time, enter_);
-        enter_gap = select(later, gap, enter_gap);
-        enter_rate = select(later, rate, enter_rate);
-        enter_axis = select(later, with_sign_of(c, Lanes(-1.0 - number)), enter_axis);
-        const Lanes end = rest * inverse;
-        const LaneMask sooner = clear & (end < leave_);
-        leave_ = select(sooner, end, leave_);
-        leave_rest = select(sooner, rest, leave_rest);
-        leave_rate = select(sooner, rate, leave_rate);
-        leave_axis = select(sooner, with_sign_of(c, Lanes(-1.0 - number)), leave_axis);
-        depth = lesser(depth, r - size);
+        gap_of[number] = gap;
+        rest_of[number] = rest;
+        rate_of[number] = rate;
+        latest_of[number] = latest;
+        soonest_of[number] = soonest;
     }
 
-    Lanes enter_high = 0.0, leave_low = kInfinity;  ///< proven by all
-    Lanes enter_high_of[kAxes], leave_low_of[kAxes];
-    Lanes enter_gap = 0.0, enter_rate = 1.0;  ///< of the axis with the latest entry
-    Lanes leave_rest = kInfinity, leave_rate = 1.0;
-    Lanes enter_axis = 0.0, leave_axis = 0.0;  ///< its number and one, negative where the normal is opposite
-    Lanes depth = kInfinity;                   ///< least overlap at the start
+    Lanes enter_high = 0.0, leave_low = kInfinity;  ///< contact starts no later, and ends no sooner
+    Lanes enter_axis = 0.0, leave_axis = 0.0;       ///< which say so
+    Lanes gap_of[kAxes], rest_of[kAxes], rate_of[kAxes], latest_of[kAxes], soonest_of[kAxes];
 
-    /// Proven by those axes: where the gaps are off by that much.
-    [[nodiscard]] GEOMSRV_INLINE Lanes enter_low(const Lanes& margin) const {
-        const Lanes inverse = Lanes(1.0) / enter_rate;
-        return greater(Lanes(0.0), (enter_gap - margin) * (inverse - rate_error_ * inverse * inverse));
+    GEOMSRV_INLINE void forget() {
+        enter_high = enter_axis = leave_axis = 0.0;
+        leave_low = kInfinity;
     }
-    [[nodiscard]] GEOMSRV_INLINE Lanes leave_high(const Lanes& margin) const {
-        const Lanes inverse = Lanes(1.0) / leave_rate;
-        return (leave_rest + margin) * (inverse + Lanes(kSecondOrder) * (rate_error_ * inverse * inverse));
+    [[nodiscard]] GEOMSRV_INLINE LaneMask clear() const { return clear_; }
+
+    /// That axis in each lane.
+    GEOMSRV_INLINE static Lanes picked(const Lanes (&of)[kAxes], const Lanes& axis) {
+        return Lanes(Lanes::Vector{of[static_cast<int>(axis[0])][0], of[static_cast<int>(axis[1])][1],
+                                   of[static_cast<int>(axis[2])][2], of[static_cast<int>(axis[3])][3]});
     }
-    [[nodiscard]] GEOMSRV_INLINE LaneMask never(const LanePair& pair) const {
-        const Lanes margin = slack_margin(pair);
-        const Lanes start = Lanes(1.0 - kTimeError) * enter_low(margin);
-        return pair.ordinary &
-               ((pair.end < start) | (Lanes(1.0 + kTimeError) * leave_high(margin) < start));
+    /// Contact starts no sooner and ends no later than an axis says, if its gap is off by `margin`.
+    GEOMSRV_INLINE Lanes enter_low(const Lanes& gap, const Lanes& rate, const Lanes& margin) const {
+        const Lanes low = (gap - margin) / rate;
+        return greater(Lanes(0.0), low - low * (Lanes(kSecondOrder) * rate_error_ / rate));
     }
-    [[nodiscard]] GEOMSRV_INLINE Lanes slack_margin(const LanePair& pair) const {
-        return margin_ + Lanes(kStretch) * pair.slack;
+    GEOMSRV_INLINE Lanes leave_high(const Lanes& rest, const Lanes& rate, const Lanes& margin) const {
+        const Lanes high = (rest + margin) / rate;
+        const Lanes later = high + high * (Lanes(kSecondOrder) * rate_error_ / rate);
+        return select(Lanes(kClearRate) * rate_error_ < rate, later, kInfinity);
     }
     [[nodiscard]] GEOMSRV_INLINE Lanes margin() const { return margin_; }
     [[nodiscard]] GEOMSRV_INLINE Lanes wide_margin() const { return wide_margin_; }
+    /// Least overlap at the start.
+    [[nodiscard]] GEOMSRV_INLINE Lanes depth() const {
+        Lanes out = kInfinity;
+        for (int k = 0; k < kAxes; ++k) out = lesser(out, lesser(-gap_of[k], rest_of[k]));
+        return out;
+    }
 
 private:
     Lanes rate_error_, margin_, wide_margin_;
-    Lanes enter_ = 0.0, leave_ = kInfinity;
+    LaneMask clear_ = Lanes(0.0) < Lanes(1.0);
 };
 
 /// Whether a = b or a = -b.
@@ -299,8 +304,7 @@ GEOMSRV_INLINE AxisEdges edges_of(const MovingBoxes& a, const MovingBoxes& b, st
             {one.half[3 * one.step * pair + i], other.half[3 * other.step * pair + j]}};
 }
 
-WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t pair, int axis,
-                 bool against) {
+WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t pair, int axis) {
     const auto vector = [](const double* row) { return Vec3{row[0], row[1], row[2]}; };
     const double* const edges_a = boxes_a.axes + 9 * boxes_a.step * pair;
     const double* const edges_b = boxes_b.axes + 9 * boxes_b.step * pair;
@@ -319,9 +323,9 @@ WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::si
             r = r + (along.hi < 0.0 ? -along : along) * half[k];
         }
     }
-    const DoubleDouble s = against ? -dot(m, d) : dot(m, d);
-    const DoubleDouble c = against ? -dot(m, w) : dot(m, w);
-    return {s - r, s + r, -c};
+    const DoubleDouble s = dot(m, d);
+    const DoubleDouble c = dot(m, w);
+    return c.hi < 0.0 ? WideGap{s - r, s + r, -c} : WideGap{-s - r, -s + r, c};
 }
 
 /// Rounded to nearest but for a hair; NaN where rounding may have done more.
@@ -334,7 +338,7 @@ double wide_time(DoubleDouble gap, DoubleDouble rate, const Refinement& axes) {
 /// The start of contact from double-double; false where that is no use, or another axis comes in between.
 bool refine_start(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, const Refinement& axes,
                   BoxMotion& out) {
-    const WideGap wide = wide_gap(a, b, pair, out.axis, out.against);
+    const WideGap wide = wide_gap(a, b, pair, out.axis);
     const double latest = out.time_upper;
     out.wide = true;
     out.time = wide_time(wide.gap, wide.rate, axes);
@@ -343,7 +347,7 @@ bool refine_start(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, 
     out.time_upper = next_up(out.time);
     bool sure = out.time_upper <= latest;
     for (int k = 0; k < kAxes; ++k) {
-        const double other = (1.0 + kTimeError) * axes.contact.enter_high_of[k][axes.lane];
+        const double other = (1.0 + kTimeError) * axes.contact.latest_of[k][axes.lane];
         sure = sure && (k == out.axis || other <= out.time_lower);
     }
     return sure;
@@ -352,16 +356,14 @@ bool refine_start(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, 
 /// Likewise its end.
 bool refine_end(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, const Refinement& axes,
                 BoxMotion& out) {
-    const double sign = axes.contact.leave_axis[axes.lane];
-    const int axis = static_cast<int>(std::fabs(sign)) - 1;
-    if (axis < 0) return false;
-    const WideGap wide = wide_gap(a, b, pair, axis, sign < 0.0);
+    const int axis = static_cast<int>(axes.contact.leave_axis[axes.lane]);
+    const WideGap wide = wide_gap(a, b, pair, axis);
     out.wide = true;
     out.last_time = wide_time(wide.rest, wide.rate, axes);
     if (!(out.last_time < kInfinity)) return false;
     bool sure = true;
     for (int k = 0; k < kAxes; ++k) {
-        const double other = (1.0 - kTimeError) * axes.contact.leave_low_of[k][axes.lane];
+        const double other = (1.0 - kTimeError) * axes.contact.soonest_of[k][axes.lane];
         sure = sure && (k == axis || next_up(out.last_time) <= other);
     }
     return sure;
@@ -413,20 +415,19 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
     }
 
     Contact contact(pair, parallel);
-    const Lanes volume_a = magnitude(dot(face_a[0], a.edge[0]));
-    const Lanes volume_b = magnitude(dot(face_b[0], b.edge[0]));
-    for (int i = 0; i < 3; ++i) {
-        const Lanes r =
-            volume_a * a.half[i] + (of_a[i][0] * b.half[0] + of_a[i][1] * b.half[1] + of_a[i][2] * b.half[2]);
-        contact.add(i, dot(face_a[i], pair.d), dot(face_a[i], pair.w), r);
-    }
-    for (int j = 0; j < 3; ++j) {
-        const Lanes r =
-            volume_b * b.half[j] + (of_b[0][j] * a.half[0] + of_b[1][j] * a.half[1] + of_b[2][j] * a.half[2]);
-        contact.add(3 + j, dot(face_b[j], pair.d), dot(face_b[j], pair.w), r);
-    }
-    LaneMask never = contact.never(pair);
-    if (!all(never)) {
+    const auto ask = [&]<bool Careful>() __attribute__((always_inline)) {
+        const Lanes volume_a = magnitude(dot(face_a[0], a.edge[0]));
+        const Lanes volume_b = magnitude(dot(face_b[0], b.edge[0]));
+        for (int i = 0; i < 3; ++i) {
+            const Lanes r = volume_a * a.half[i] +
+                            (of_a[i][0] * b.half[0] + of_a[i][1] * b.half[1] + of_a[i][2] * b.half[2]);
+            contact.add<Careful>(i, dot(face_a[i], pair.d), dot(face_a[i], pair.w), r);
+        }
+        for (int j = 0; j < 3; ++j) {
+            const Lanes r = volume_b * b.half[j] +
+                            (of_b[0][j] * a.half[0] + of_b[1][j] * a.half[1] + of_b[2][j] * a.half[2]);
+            contact.add<Careful>(3 + j, dot(face_b[j], pair.d), dot(face_b[j], pair.w), r);
+        }
         for (int i = 0; i < 3; ++i) {
             const int i1 = kNext[i];
             const int i2 = kLast[i];
@@ -435,36 +436,57 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
             for (int j = 0; j < 3; ++j) {
                 const int j1 = kNext[j];
                 const int j2 = kLast[j];
-                const Lanes r = (a.half[i1] * of_a[i2][j] + a.half[i2] * of_a[i1][j]) +
-                                (b.half[j1] * of_b[i][j2] + b.half[j2] * of_b[i][j1]);
-                // An axis that is skipped is in contact for ever.
-                const Lanes s = kept(~skipped[i][j], dot(across, b.edge[j]));
-                const Lanes c = kept(~skipped[i][j], dot(across_rate, b.edge[j]));
-                contact.add(6 + 3 * i + j, s, c, select(skipped[i][j], Lanes(kInfinity), r));
+                Lanes r = (a.half[i1] * of_a[i2][j] + a.half[i2] * of_a[i1][j]) +
+                          (b.half[j1] * of_b[i][j2] + b.half[j2] * of_b[i][j1]);
+                Lanes s = dot(across, b.edge[j]);
+                Lanes c = dot(across_rate, b.edge[j]);
+                if constexpr (Careful) {
+                    // An axis that is skipped is in contact for ever.
+                    s = kept(~skipped[i][j], s);
+                    c = kept(~skipped[i][j], c);
+                    r = select(skipped[i][j], Lanes(kInfinity), r);
+                }
+                contact.add<Careful>(6 + 3 * i + j, s, c, r);
             }
         }
-        never = contact.never(pair);
+    };
+    ask.template operator()<false>();
+    if (any(any_skipped | ~contact.clear())) {
+        contact.forget();
+        ask.template operator()<true>();
     }
 
-    const Lanes start = Lanes(1.0 - kTimeError) * contact.enter_low(contact.margin());
+    const Lanes gap = Contact::picked(contact.gap_of, contact.enter_axis);
+    const Lanes rate = Contact::picked(contact.rate_of, contact.enter_axis);
+    const Lanes rest = Contact::picked(contact.rest_of, contact.leave_axis);
+    const Lanes leave_rate = Contact::picked(contact.rate_of, contact.leave_axis);
+    const Lanes slack_margin = contact.margin() + Lanes(kStretch) * pair.slack;
+    const Lanes slack_start = Lanes(1.0 - kTimeError) * contact.enter_low(gap, rate, slack_margin);
+    const Lanes slack_end = Lanes(1.0 + kTimeError) * contact.leave_high(rest, leave_rate, slack_margin);
+    const LaneMask never = pair.ordinary & ((pair.end < slack_start) | (slack_end < slack_start));
+
+    const Lanes start = Lanes(1.0 - kTimeError) * contact.enter_low(gap, rate, contact.margin());
     const Lanes late_start = Lanes(1.0 + kTimeError) * contact.enter_high;
     const Lanes end = Lanes(1.0 - kTimeError) * contact.leave_low;
-    const Lanes late_end = Lanes(1.0 + kTimeError) * contact.leave_high(contact.margin());
+    const Lanes late_end = Lanes(1.0 + kTimeError) * contact.leave_high(rest, leave_rate, contact.margin());
     const LaneMask sharp_end = late_end - end <= Lanes(kSharp) * end;
     const LaneMask sharp_start = late_start - start <= Lanes(kSharp) * late_start;
     const LaneMask meet = pair.ordinary & (late_start < end) & (late_start <= pair.end);
-    const LaneMask touch = meet & (contact.slack_margin(pair) < contact.enter_gap);
-    const Lanes deep =
-        contact.wide_margin() + Lanes(kStretch) * (pair.slack + Lanes(kLeastMargin) * pair.size);
-    const LaneMask overlap = meet & (deep < contact.depth);
+    const LaneMask touch = meet & (slack_margin < gap);
+    LaneMask overlap = meet & (late_start <= Lanes(0.0));
+    if (any(overlap)) {
+        const Lanes deep =
+            contact.wide_margin() + Lanes(kStretch) * (pair.slack + Lanes(kLeastMargin) * pair.size);
+        overlap = overlap & (deep < contact.depth());
+    }
     const auto value = [](BoxMotion::Verdict v) { return Lanes(static_cast<double>(v)); };
     const Lanes verdict = select(never, value(BoxMotion::Verdict::never),
                                  select(touch, value(BoxMotion::Verdict::will_touch),
                                         select(overlap, value(BoxMotion::Verdict::overlapping), value({}))));
     const Lanes blunt_start = select(sharp_start | overlap, Lanes(0.0), Lanes(1.0));
     const Lanes blunt_end = select(sharp_end, Lanes(0.0), Lanes(1.0));
-    const Lanes time = contact.enter_gap / contact.enter_rate;
-    const Lanes last = contact.leave_rest / contact.leave_rate;
+    const Lanes time = gap / rate;
+    const Lanes last = rest / leave_rate;
     double product[3][4] = {};
     for (int k = 0; k < 4; ++k) {
         BoxMotion& out = *row[k];
@@ -474,16 +496,15 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
         out.time = std::clamp(time[k], start[k], late_start[k]);
         out.time_lower = start[k];
         out.time_upper = late_start[k];
-        out.against = contact.enter_axis[k] < 0.0;
-        out.axis = static_cast<std::uint8_t>(std::max(std::fabs(contact.enter_axis[k]) - 1.0, 0.0));
+        out.axis = static_cast<std::uint8_t>(contact.enter_axis[k]);
         const Refinement axes = {contact, k, parallel[k] == 0.0 ? pair.size[k] : kInfinity, pair.speed[k]};
         if ((blunt_start[k] != 0.0 && !refine_start(boxes_a, boxes_b, index[k], axes, out)) ||
             (blunt_end[k] != 0.0 && !refine_end(boxes_a, boxes_b, index[k], axes, out))) {
             out.verdict = BoxMotion::Verdict::unclear;
         }
         const AxisEdges edges = edges_of(boxes_a, boxes_b, index[k], out.axis);
-        const Vec3 p = out.against ? edges.second : edges.first;
-        const Vec3 q = out.against ? edges.first : edges.second;
+        const Vec3 p = edges.first;
+        const Vec3 q = edges.second;
         product[0][k] = p.y * q.z - p.z * q.y;
         product[1][k] = p.z * q.x - p.x * q.z;
         product[2][k] = p.x * q.y - p.y * q.x;
@@ -492,9 +513,10 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
     }
     Four normal = {Lanes::load(product[0]), Lanes::load(product[1]), Lanes::load(product[2])};
     const Lanes size = square_root(dot(normal, normal));
-    // The sum leaves no zero of the wrong sign.
+    // From a to b is against the motion.  The sum leaves no zero of the wrong sign.
     const Lanes none = 0.0;
-    normal = {normal.x / size + none, normal.y / size + none, normal.z / size + none};
+    const Lanes length = with_sign_of(dot(normal, pair.w), -size);
+    normal = {normal.x / length + none, normal.y / length + none, normal.z / length + none};
     const Lanes closing = none - dot(normal, pair.w);
     for (int k = 0; k < 4; ++k) {
         BoxMotion& out = *row[k];

@@ -33,7 +33,6 @@ struct BoxMotion {
     };
     Verdict verdict = Verdict::unclear;
     std::uint8_t axis = 0;  ///< of first contact: 0-2 faces of a, 3-5 of b, 6 + 3 i + j edges i of a, j of b
-    bool against = false;   ///< the normal is opposite to the product of the edges of that axis
     bool wide = false;      ///< it took double-double to tell the times
     double time = 0.0;      ///< [s]
     double time_lower = 0.0;     ///< the exact time is not earlier,
