@@ -289,6 +289,7 @@ struct WideGap {
 struct AxisEdges {
     Vec3 first, second;
     double half[2];
+    int of_a[2], of_b[2];  ///< their numbers, or -1
 };
 
 GEOMSRV_INLINE AxisEdges edges_of(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, int axis) {
@@ -301,7 +302,9 @@ GEOMSRV_INLINE AxisEdges edges_of(const MovingBoxes& a, const MovingBoxes& b, st
     const double* const q = other.axes + 9 * other.step * pair + 3 * j;
     return {{p[0], p[1], p[2]},
             {q[0], q[1], q[2]},
-            {one.half[3 * one.step * pair + i], other.half[3 * other.step * pair + j]}};
+            {one.half[3 * one.step * pair + i], other.half[3 * other.step * pair + j]},
+            {axis < 3 || crossed ? static_cast<int>(i) : -1, axis < 3 ? static_cast<int>(j) : -1},
+            {axis >= 3 ? static_cast<int>(j) : -1, axis >= 3 && !crossed ? static_cast<int>(i) : -1}};
 }
 
 WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::size_t pair, int axis) {
@@ -317,12 +320,16 @@ WideGap wide_gap(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b, std::si
     const WideVec3 w = exact_difference(vector(boxes_b.velocity + 3 * boxes_b.velocity_step * pair),
                                         vector(boxes_a.velocity + 3 * boxes_a.velocity_step * pair));
     DoubleDouble r;
-    for (int k = 0; k < 3; ++k) {
-        for (const auto& [edges, half] : {std::pair(edges_a, half_a), std::pair(edges_b, half_b)}) {
+    const auto widen_by = [&](const double* edges, const double* half, int without, int nor) {
+        for (int k = 0; k < 3; ++k) {
+            if (k == without || k == nor) continue;
             const DoubleDouble along = dot(m, vector(edges + 3 * k));
             r = r + (along.hi < 0.0 ? -along : along) * half[k];
         }
-    }
+    };
+    // Those that make the axis are across it.
+    widen_by(edges_a, half_a, made_of.of_a[0], made_of.of_a[1]);
+    widen_by(edges_b, half_b, made_of.of_b[0], made_of.of_b[1]);
     const DoubleDouble s = dot(m, d);
     const DoubleDouble c = dot(m, w);
     return c.hi < 0.0 ? WideGap{s - r, s + r, -c} : WideGap{-s - r, -s + r, c};
