@@ -17,6 +17,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 # One core for all contenders; must be set before numpy is loaded.
@@ -98,6 +99,12 @@ def declare(quick: bool) -> list[Scenario]:
         ),
         Scenario("polygon distance 4-16", None, (lambda: gs.distance(a, b), len(a))),
     ]
+    moving_boxes = scenarios.moving_boxes(100_000 // cut)
+    for name, given in (("boxes", moving_boxes), ("boxes, most apart", scenarios.off_course(moving_boxes))):
+        touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))
+        label = f"first contact, {name}, {touch:.0%} hits, no points"
+        ask = partial(gs.first_contact, *given, contact_set=False)
+        table.append(Scenario(label, 30.0, (ask, len(given[0]))))
     for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
         given = moving(100_000 // cut)
         touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))

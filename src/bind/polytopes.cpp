@@ -211,15 +211,15 @@ nb::tuple first_contact(const nb::tuple& side_a, const nb::tuple& side_b, const 
 }
 
 /// What the axes alone say of every pair: BoxMotion::Verdict.
-nb::object box_motion_verdicts(const nb::tuple& side_a, const nb::tuple& side_b, const Rows3& velocity_a,
-                               const Rows3& velocity_b, double t_max) {
+nb::object box_motion_verdicts_world(const nb::tuple& side_a, const nb::tuple& side_b,
+                                     const Rows3& velocity_a, const Rows3& velocity_b, double t_max) {
     const MovingBodies a(side_a, velocity_a);
     const MovingBodies b(side_b, velocity_b);
     const std::size_t count = std::max(a.size(), b.size());
     const auto fits = [&](std::size_t n) { return n == 1 || n == count; };
     if (!a.boxes() || !b.boxes() || !fits(a.size()) || !fits(b.size()) || !fits(a.velocities()) ||
         !fits(b.velocities())) {
-        throw nb::value_error("box_motion_verdicts: not pairs of boxes");
+        throw nb::value_error("box_motion_verdicts_world: not pairs of boxes");
     }
     std::vector<BoxMotion> known(count);
     decide_box_motions(a.rows(), b.rows(), 0, count, t_max, known.data());
@@ -234,7 +234,7 @@ void define_polytopes(nb::module_& m) {
     m.def("first_contact_world", first_contact, nb::arg("a"), nb::arg("b"), nb::arg("velocity_a").noconvert(),
           nb::arg("velocity_b").noconvert(), nb::arg("t_max"), nb::arg("contact_set"),
           nb::arg("accuracy") = "float64");
-    m.def("box_motion_verdicts", box_motion_verdicts, nb::arg("a"), nb::arg("b"),
+    m.def("box_motion_verdicts_world", box_motion_verdicts_world, nb::arg("a"), nb::arg("b"),
           nb::arg("velocity_a").noconvert(), nb::arg("velocity_b").noconvert(), nb::arg("t_max"));
 }
 

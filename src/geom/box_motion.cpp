@@ -213,8 +213,11 @@ public:
         const Lanes that = static_cast<double>(number);
         enter_axis = select(enter_high < latest, that, enter_axis);
         enter_high = greater(enter_high, latest);
-        leave_axis = select(soonest < leave_low, that, leave_axis);
-        leave_low = lesser(leave_low, soonest);
+        // An axis that is not clear has no exit of which it could be said to be the earliest.
+        const Lanes exit = Careful ? select(clear, soonest, Lanes(kInfinity)) : soonest;
+        leave_axis = select(exit < earliest_, that, leave_axis);
+        earliest_ = lesser(exit, earliest_);
+        leave_low = Careful ? lesser(soonest, leave_low) : earliest_;
         gap_of[number] = gap;
         rest_of[number] = rest;
         rate_of[number] = rate;
@@ -228,7 +231,7 @@ public:
 
     GEOMSRV_INLINE void forget() {
         enter_high = enter_axis = leave_axis = 0.0;
-        leave_low = kInfinity;
+        leave_low = earliest_ = kInfinity;
     }
     [[nodiscard]] GEOMSRV_INLINE LaneMask clear() const { return clear_; }
 
@@ -258,6 +261,7 @@ public:
 
 private:
     Lanes rate_error_, margin_, wide_margin_;
+    Lanes earliest_ = kInfinity;
     LaneMask clear_ = Lanes(0.0) < Lanes(1.0);
 };
 
