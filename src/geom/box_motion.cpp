@@ -60,13 +60,15 @@ constexpr double kTimeError = 8 * kUnitRoundoff;
 // Edges a_i, b_j are parallel if b_j has no larger share than this of the other two edges of a, found to 7 u
 // each.  Then the axis that they make is worth nothing, and b_j is taken for its share along a_i, which is
 // off by y = 1.05 times both shares.  That moves the boxes by y f_j against each other, and it turns the
-// axes that b_j makes by 1.03 y, hence their gaps by as much of |d| + sum e_i + sum f_j: 2.2 y covers both.
-// Contact cannot begin later, nor end sooner, than for those other boxes with their slabs narrower by that
-// (if a convex body and a ball hold another, then they hold it without the ball, narrower by it).  Where the
-// edges are the same but for their sign nothing of this counts.
+// axes that b_j makes by 1.01 y.  While the boxes are in contact along the axes of a, |d + t w| <= S, where
+// S = sum e_i + sum f_j, up to 1.05, so turning changes m . (d + t w) and r by 1.06 y S each: 3.3 y S covers
+// all three.  Contact cannot begin later, nor end sooner, than for those other boxes with their slabs
+// narrower by that (if a convex body and a ball hold another body, the first holds what is left of the other
+// if it is made narrower by the ball).  Where the edges are the same but for their sign nothing of this
+// counts.
 constexpr double kParallel = 64 * kUnitRoundoff;
 constexpr double kShareError = 7 * kUnitRoundoff;
-constexpr double kParallelError = 2.2 * 1.05;
+constexpr double kParallelError = 3.3 * 1.05;
 
 // As polytope_first_contact.cpp has it for casts.  It keeps rates above 0.03 |w|, too, which is more than
 // what sliding within the slack is.
@@ -153,8 +155,8 @@ GEOMSRV_INLINE LanePair pair_of(const LaneBoxes& a, const LaneBoxes& b, double t
     const Lanes fastest = largest_part(out.w);
     const LaneMask rests = fastest <= Lanes(0.0);
     out.end = select(rests, Lanes(0.0), Lanes(t_max));
-    // For kernels that square, numbers in the middle of the range of double.
-    out.ordinary = within(kSmallestReach, out.size, kLargestReach) & (largest <= Lanes(0x1p400)) &
+    // Lengths and speeds are multiplied.
+    out.ordinary = within(kSmallestReach, out.size, kLargestReach) &
                    (rests | within(kSmallestReach, fastest, kLargestReach));
     out.speed = select(rests, Lanes(1.0), out.speed);
     return out;
