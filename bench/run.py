@@ -17,6 +17,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 # One core for all contenders; must be set before numpy is loaded.
@@ -105,6 +106,12 @@ def declare(quick: bool) -> list[Scenario]:
             (lambda: gs.first_contact(box_a, box_b, **turning, t_max=5.0), len(box_a)),
         ),
     ]
+    moving_boxes = scenarios.moving_boxes(100_000 // cut)
+    for name, given in (("boxes", moving_boxes), ("boxes, most apart", scenarios.off_course(moving_boxes))):
+        touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))
+        label = f"first contact, {name}, {touch:.0%} hits, no points"
+        ask = partial(gs.first_contact, *given, contact_set=False)
+        table.append(Scenario(label, 30.0, (ask, len(given[0]))))
     for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
         given = moving(100_000 // cut)
         touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))

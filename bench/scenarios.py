@@ -100,6 +100,12 @@ def moving_boxes(n: int = 100_000) -> Moving:
     return *batches, velocity_a, velocity_b
 
 
+def off_course(given: Moving) -> Moving:
+    """The same boxes further apart, and each on the course of the next: most miss."""
+    a, b, velocity_a, velocity_b = given
+    return a, gs.Boxes(2.0 * np.roll(b.center, 1, axis=0), b.axes, b.half_extents), velocity_a, velocity_b
+
+
 def moving_hulls(n: int = 100_000) -> Moving:
     """The same with convex hulls of 8 to 32 points on an ellipsoid."""
     rng = np.random.default_rng(SEED)

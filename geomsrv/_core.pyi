@@ -66,6 +66,9 @@ def first_contact_world(
     contact_set: bool,
     accuracy: str = "float64",
 ) -> _Contacts: ...
+def box_motion_verdicts_world(
+    a: tuple[_F | _I, ...], b: tuple[_F | _I, ...], velocity_a: _F, velocity_b: _F, t_max: float
+) -> _U: ...
 def distance_polygons(
     vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool, accuracy: str = "float64"
 ) -> tuple[_F, _F, _F, _F, _F, _F, _U, _B, _B, _Rungs]: ...

@@ -27,6 +27,7 @@ from polytope_scenes import (
 )
 
 import geomsrv as gs
+from geomsrv import _core
 
 INF = math.inf
 STATUS = {
@@ -491,6 +492,175 @@ def test_without_contact_set(rng):
         )
         assert len(full.points) == 4 and len(bare.points) == 0 and bare.point_offsets.tolist() == [0, 0]
         assert full.time == bare.time and (full.normal == bare.normal).all()
+
+
+# --------------------------------------------------------------------------------------- boxes by their axes
+
+
+UNCLEAR = 0  # BoxMotion::Verdict; the others are never, will touch, overlapping
+VERDICTS = {1: gs.NEVER, 2: gs.WILL_TOUCH, 3: gs.OVERLAPPING}
+
+
+def verdicts(a, b, velocity_a, velocity_b, t_max=INF):
+    """What the axes alone say."""
+    sides = ((boxes.center, boxes.axes, boxes.half_extents) for boxes in (a, b))
+    velocities = (
+        np.array(np.broadcast_to(v, boxes.center.shape), float) for v, boxes in ((velocity_a, a), (velocity_b, b))
+    )
+    return _core.box_motion_verdicts_world(*sides, *velocities, float(t_max))
+
+
+def gap_along_axes(a, b):
+    """Where b, moved along the line of centers, touches a: a factor."""
+    edges = np.cross(a.axes[:, :, None], b.axes[:, None]).reshape(-1, 9, 3)
+    faces = [np.cross(np.roll(x.axes, -1, 1), np.roll(x.axes, -2, 1)) for x in (a, b)]
+    normals = np.concatenate([*faces, edges], axis=1)
+    widths = sum((np.abs(np.einsum("nki,nji->nkj", normals, x.axes)) * x.half_extents[:, None]).sum(-1) for x in (a, b))
+    return (widths / np.abs(np.einsum("nki,ni->nk", normals, b.center - a.center))).min(axis=1)
+
+
+def moving_boxes(rng, kind, n):
+    """Pairs of boxes and the velocities, of which the axes have an easy or a hard time."""
+    turns = np.array([[rotation(rng), rotation(rng)] for _ in range(n)])
+    axes, other = turns[:, 0], turns[:, 1]
+    center, half = rng.uniform(-4, 4, (2, n, 3)), rng.uniform(0.1, 1.0, (2, n, 3))
+    at, velocity = np.zeros((n, 3)), (center[0] - center[1]) * rng.uniform(-0.5, 2.0, (n, 1))
+    velocity += rng.uniform(-0.5, 0.5, (n, 3))
+    if kind == "parallel":
+        other = axes[:, rng.permutation(3)]
+    elif kind == "nearly parallel":
+        other = axes + rng.uniform(-1, 1, (n, 3, 3)) * 10.0 ** rng.uniform(-17, -4, (n, 1, 1))
+    elif kind == "skew":
+        axes, other = (x + 1e-3 * rng.uniform(-1, 1, (n, 3, 3)) for x in (axes, other))
+        other[::3] = axes[::3]
+    elif kind == "grid":
+        axes = other = np.tile(np.eye(3), (n, 1, 1))
+        center, half = rng.integers(-3, 4, (2, n, 3)).astype(float), rng.integers(0, 4, (2, n, 3)) / 2.0
+        at, velocity = rng.integers(-2, 3, (2, n, 3)).astype(float)
+    elif kind == "turned grid":
+        other = axes
+        center = np.einsum("kni,nij->knj", rng.integers(-3, 4, (2, n, 3)).astype(float), axes) + 7.0
+        half = rng.integers(1, 4, (2, n, 3)) / 2.0
+        velocity = np.einsum("ni,nij->nj", rng.integers(-2, 3, (n, 3)).astype(float), axes)
+    elif kind == "flat":
+        half[rng.random(half.shape) < 0.4] = 0.0
+    elif kind == "needles":
+        half *= 10.0 ** rng.uniform(-12, 0, half.shape)
+        velocity = center[0] - center[1] + 1e-3 * rng.normal(size=(n, 3))
+    elif kind == "at rest":
+        velocity = at
+    elif kind == "any scale":
+        length, speed = (10.0 ** rng.choice(x, (n, 1)) for x in ((-300.0, -29.0, 29.0, 300.0), (-200.0, -1.0, 200.0)))
+        center, half, velocity = center * length, half * length, velocity * speed
+    if kind == "far away":
+        center = center + 10.0 ** rng.uniform(2, 8, (n, 1)) * rng.normal(size=(n, 3))
+    a, b = gs.Boxes(center[0], axes, half[0]), gs.Boxes(center[1], other, half[1])
+    if kind == "about to touch":
+        factor = gap_along_axes(a, b) * (1.0 + rng.choice([-1, 0, 1], n) * 10.0 ** rng.uniform(-17, -6, n))
+        b = gs.Boxes(a.center + factor[:, None] * (b.center - a.center), other, half[1])
+    return a, b, at, velocity
+
+
+BOX_KINDS = {
+    # least share that the axes decide, least share that they leave, of 200 pairs
+    "any": (0.99, 0.0),
+    "parallel": (0.9, 0.0),
+    "nearly parallel": (0.6, 0.01),
+    "skew": (0.9, 0.0),
+    "grid": (0.6, 0.02),
+    "turned grid": (0.6, 0.02),
+    "flat": (0.8, 0.0),
+    "needles": (0.9, 0.0),
+    "at rest": (0.5, 0.0),
+    "any scale": (0.0, 0.3),
+    "far away": (0.9, 0.0),
+    "about to touch": (0.1, 0.3),
+}
+
+
+@pytest.mark.parametrize("t_max", [INF, 1.0])
+@pytest.mark.parametrize("kind", BOX_KINDS)
+def test_boxes_decided_on_their_axes(rng, kind, t_max):
+    """What the axes decide is right and certain, what they leave is answered; against the exact tier."""
+    a, b, at, velocity = moving_boxes(rng, kind, 200)
+    verdict = verdicts(a, b, at, velocity, t_max)
+    plain, sharp = (gs.first_contact(a, b, at, velocity, t_max=t_max, accuracy=tier) for tier in ("float64", "exact"))
+    given = reproducer(kind=kind, t_max=t_max)
+    decided = verdict != UNCLEAR
+    assert BOX_KINDS[kind][0] <= decided.mean() <= 1.0 - BOX_KINDS[kind][1], given
+    for value, status in VERDICTS.items():
+        assert (plain.status[verdict == value] == status).all(), given
+    assert plain.certain[decided].all(), given
+    assert (plain.status == sharp.status)[plain.certain].all(), given
+    hits = sharp.status != gs.NEVER
+    assert (plain.status[hits] != gs.NEVER).all(), given
+    assert (plain.time_lower <= sharp.time_upper)[hits].all(), given
+    assert (plain.time_upper >= sharp.time_lower)[hits].all(), given
+    clear = hits & decided
+    np.testing.assert_allclose(plain.time[clear], sharp.time[clear], rtol=TIME_ERROR, err_msg=given)
+    np.testing.assert_allclose(plain.last_time[clear], sharp.last_time[clear], rtol=TIME_ERROR, err_msg=given)
+    assert (plain.time_lower <= plain.time)[clear].all() and (plain.time <= plain.time_upper)[clear].all(), given
+    assert (plain.time_upper - plain.time_lower <= TIME_ERROR * plain.time_upper)[clear].all(), given
+    assert (np.diff(plain.point_offsets)[clear] > 0).all(), given
+    touch = verdict == 2
+    np.testing.assert_allclose(np.linalg.norm(plain.normal[touch], axis=1), 1.0, rtol=2.0**-51)
+    closing = -((velocity - at) * plain.normal).sum(axis=1)
+    np.testing.assert_allclose(plain.closing_speed[touch], closing[touch], rtol=1e-12, err_msg=given)
+    if kind in ("any", "skew", "far away"):
+        np.testing.assert_allclose(plain.normal[touch], sharp.normal[touch], atol=1e-12, err_msg=given)
+
+
+def test_boxes_decided_on_their_axes_against_the_oracle(rng):
+    for kind in ("any", "nearly parallel", "flat", "about to touch"):
+        a, b, at, velocity = moving_boxes(rng, kind, 12)
+        plain, verdict = gs.first_contact(a, b, at, velocity, t_max=2.0), verdicts(a, b, at, velocity, 2.0)
+        for i in range(12):
+            truth = exact.first_contact(box_corners(a, i), at[i].tolist(), box_corners(b, i), velocity[i].tolist(), 2.0)
+            given = reproducer(kind=kind, i=i)
+            check_float(plain, i, truth, 2.0, given)
+            assert verdict[i] == UNCLEAR or VERDICTS[verdict[i]] == STATUS[truth.status], given
+
+
+def test_boxes_within_the_slack_are_left_to_the_cast():
+    """Coordinates of 2^8 are rounded to 2^-45: boxes closer than some of that touch, as far as float64 knows."""
+    far = 2.0**8
+    a = gs.Boxes([(far, 0, 0)], [np.eye(3)], [(1, 1, 1)])
+    for gap, status, verdict in ((2.0**-42, gs.TOUCHING, UNCLEAR), (2.0**-30, gs.NEVER, 1)):
+        b = gs.Boxes([(far + 2 + gap, 0, 0)], [np.eye(3)], [(1, 1, 1)])
+        for velocity in ((0, 0, 0), (0, 1, 0), (1, 0, 0)):
+            answer = gs.first_contact(a, b, (0, 0, 0), velocity)
+            assert answer.status == status and answer.certain == (verdict == 1)
+            assert verdicts(a, b, (0, 0, 0), velocity) == verdict
+    # A window that ends with contact, and a line that grazes.
+    b = gs.Boxes([(far + 4, 0, 0)], [np.eye(3)], [(1, 1, 1)])
+    for t_max, verdict in ((2.0, UNCLEAR), (1.0, 1), (3.0, 2)):
+        assert verdicts(a, b, (0, 0, 0), (-1, 0, 0), t_max) == verdict
+        answer = gs.first_contact(a, b, (0, 0, 0), (-1, 0, 0), t_max=t_max)
+        assert answer.status == (gs.NEVER if verdict == 1 else gs.WILL_TOUCH)
+    grazing = gs.Boxes([(far + 4, 2, 0)], [np.eye(3)], [(1, 1, 1)])
+    assert verdicts(a, grazing, (0, 0, 0), (-1, 0, 0)) == UNCLEAR
+    assert gs.first_contact(a, grazing, (0, 0, 0), (-1, 0, 0)).status == gs.WILL_TOUCH
+
+
+def test_boxes_have_the_same_bits_alone_and_in_any_batch(rng):
+    a, b, at, velocity = moving_boxes(rng, "any", 70)
+    turned = b.axes.copy()
+    turned[::3] = a.axes[::3]
+    b = gs.Boxes(b.center, turned, b.half_extents)
+    names = ("status", "certain", "time", "time_lower", "time_upper", "last_time", "normal", "closing_speed")
+
+    def rows(boxes, which):
+        return gs.Boxes(boxes.center[which], boxes.axes[which], boxes.half_extents[which])
+
+    whole = gs.first_contact(a, b, at, velocity)
+    for i in range(70):
+        one = gs.first_contact(rows(a, [i]), rows(b, [i]), at[i], velocity[i])
+        for name in names:
+            np.testing.assert_array_equal(getattr(one, name)[0], getattr(whole, name)[i])
+    many = gs.first_contact(rows(a, [0]), b, (0, 0, 0), velocity)
+    again = gs.first_contact(rows(a, [0] * 70), b, (0, 0, 0), velocity)
+    for name in names:
+        np.testing.assert_array_equal(getattr(many, name), getattr(again, name))
 
 
 # ------------------------------------------------------------------------------------------------------- laws

@@ -14,6 +14,7 @@
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
+#include "geom/box_motion.hpp"
 #include "geom/polytope_bound.hpp"
 #include "geom/polytope_first_contact.hpp"
 
@@ -77,6 +78,11 @@ public:
             body.half[k] = half_[3 * row + k];
         }
         return out;
+    }
+
+    [[nodiscard]] bool boxes() const { return vertices_ == nullptr; }
+    [[nodiscard]] MovingBoxes rows() const {
+        return {center_, axes_, half_, velocity_, count_ == 1 ? 0U : 1U, velocities_ == 1 ? 0U : 1U};
     }
 
 private:
@@ -144,10 +150,24 @@ std::vector<Vec3> first_contacts(const MovingBodies& a, const MovingBodies& b, s
     std::vector<Vec3> points;
     Solver solver(a.largest(), b.largest());
     rows.point_offsets.data[0] = 0;
+    const bool by_axes = std::is_same_v<Solver, PolytopeContactSolver> && a.boxes() && b.boxes();
+    std::array<BoxMotion, kBoxMotionBlock> known;
     for (std::size_t i = 0; i < count; ++i) {
-        const MovingBody body_a = a[i];
-        const MovingBody body_b = b[i];
-        const PolytopeContact contact = solver.solve(body_a, body_b, t_max, contact_set);
+        const std::size_t place = i % kBoxMotionBlock;
+        if (by_axes && place == 0) {
+            decide_box_motions(a.rows(), b.rows(), i, std::min(count - i, kBoxMotionBlock), t_max,
+                               known.data());
+        }
+        const PolytopeContact contact = [&] {
+            if constexpr (std::is_same_v<Solver, PolytopeContactSolver>) {
+                if (by_axes && known[place].verdict != BoxMotion::Verdict::unclear) {
+                    const bool meet = known[place].verdict != BoxMotion::Verdict::never;
+                    return contact_set && meet ? solver.solve(a[i], b[i], t_max, known[place])
+                                               : contact_of(known[place], t_max);
+                }
+            }
+            return solver.solve(a[i], b[i], t_max, contact_set);
+        }();
         rows.set(i, contact);
         points.insert(points.end(), contact.points.begin(), contact.points.end());
         rows.point_offsets.data[i + 1] = static_cast<std::int64_t>(points.size());
@@ -190,12 +210,32 @@ nb::tuple first_contact(const nb::tuple& side_a, const nb::tuple& side_b, const 
                           nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
 }
 
+/// What the axes alone say of every pair: BoxMotion::Verdict.
+nb::object box_motion_verdicts_world(const nb::tuple& side_a, const nb::tuple& side_b,
+                                     const Rows3& velocity_a, const Rows3& velocity_b, double t_max) {
+    const MovingBodies a(side_a, velocity_a);
+    const MovingBodies b(side_b, velocity_b);
+    const std::size_t count = std::max(a.size(), b.size());
+    const auto fits = [&](std::size_t n) { return n == 1 || n == count; };
+    if (!a.boxes() || !b.boxes() || !fits(a.size()) || !fits(b.size()) || !fits(a.velocities()) ||
+        !fits(b.velocities())) {
+        throw nb::value_error("box_motion_verdicts_world: not pairs of boxes");
+    }
+    std::vector<BoxMotion> known(count);
+    decide_box_motions(a.rows(), b.rows(), 0, count, t_max, known.data());
+    const auto out = empty<std::uint8_t>({count});
+    for (std::size_t i = 0; i < count; ++i) out.data[i] = static_cast<std::uint8_t>(known[i].verdict);
+    return out.array;
+}
+
 }  // namespace
 
 void define_polytopes(nb::module_& m) {
     m.def("first_contact_world", first_contact, nb::arg("a"), nb::arg("b"), nb::arg("velocity_a").noconvert(),
           nb::arg("velocity_b").noconvert(), nb::arg("t_max"), nb::arg("contact_set"),
           nb::arg("accuracy") = "float64");
+    m.def("box_motion_verdicts_world", box_motion_verdicts_world, nb::arg("a"), nb::arg("b"),
+          nb::arg("velocity_a").noconvert(), nb::arg("velocity_b").noconvert(), nb::arg("t_max"));
 }
 
 }  // namespace geomsrv::bind

@@ -54,8 +54,18 @@ void ContactPoints::collect(const Core& core, int listed, Vec3 normal, double sl
     const Vec3 n = lowest ? -normal : normal;
     std::vector<Point>& out = face_[body];
     out.clear();
-    const double top = dot(n, vertex_of(core, highest(core, n).vertex));
+    const int highest_vertex = highest(core, n).vertex;
+    const double top = dot(n, vertex_of(core, highest_vertex));
+    // A box's vertex across an edge that descends by twice the slack, which is some ten times what rounds, is
+    // not worth a look.
+    int steep = 0;
+    for (int i = 0; i < core.generators; ++i) {
+        steep |= (std::fabs(dot(n, core.generator[i])) > slack ? 1 : 0) << i;
+    }
     for (int i = 0; i < listed; ++i) {
+        if (((i ^ highest_vertex) & steep) != 0) {
+            continue;
+        }
         const Vec3 v = vertex_of(core, i);
         if (dot(n, v) >= top - slack) {
             out.push_back(
@@ -181,13 +191,19 @@ std::span<const Vec3> ContactPoints::touching(const MovingPair& pair, Vec3 norma
                         moved ? moment * component(w, axis_[1]) : 0.0};
     collect(pair.a(), pair.given_a().body.count(), normal, slack.height, 0, {}, false);
     collect(pair.b(), pair.given_b().body.count(), normal, slack.height, 1, shift, true);
-    for (std::vector<Point>& face : face_) {
-        hull(face, slack.place);
-    }
     found_.clear();
-    for (const int lone : {0, 1}) {
-        if (face_[lone].size() == 1 && found_.empty()) {
-            found_ = face_[lone];
+    for (const std::vector<Point>& face : face_) {
+        const Point& first = face.front();
+        const bool lone = std::all_of(face.begin(), face.end(), [&](const Point& p) {
+            return std::fabs(p.x - first.x) <= slack.place && std::fabs(p.y - first.y) <= slack.place;
+        });
+        if (lone && found_.empty()) {
+            found_.push_back(first);
+        }
+    }
+    for (std::vector<Point>& face : face_) {
+        if (found_.empty()) {
+            hull(face, slack.place);
         }
     }
     // What misses by more than the slack, because its place is that much less certain, is sought with more.

@@ -16,12 +16,7 @@ namespace {
 
 constexpr std::size_t kLanes = Lanes::kCount;
 
-// Rounding of the input, as a multiple of u times the largest coordinate: rotating p takes three products and
-// two sums per coordinate, off by 3 u |p| each, 3 sqrt(3) u |p| together, and |p| <= sqrt(3) of its largest
-// coordinate: 9 u; adding a shift costs another sqrt(3) u.  Rounded up.
-constexpr double kInputNoise = 12.0 * kUnitRoundoff;
-
-// Likewise for velocities, which are only rotated.
+// As kInputNoise (moving_pair.hpp) for velocities, which are only rotated.
 constexpr double kVelocityNoise = 9.0 * kUnitRoundoff;
 
 // Velocities are rescaled where they leave this range, so that their products with lengths stay in the range
@@ -174,7 +169,7 @@ void MovingPair::load(const MovingBody& a, const MovingBody& b) {
         place(scale_ * scale_for(finite ? reach() : largest_));
     }
     set_motion();
-    noise_ = std::min(2.0 * kInputNoise * largest_, kLargestSlack * reach());
+    noise_ = std::min(kMostNoise * largest_, kLargestSlack * reach());
 }
 
 void MovingPair::place(double scale) {

@@ -90,6 +90,14 @@ private:
     std::vector<double> points_b_;
 };
 
+// Rounding of the input, as a multiple of u times the largest coordinate: rotating p takes three products and
+// two sums per coordinate, off by 3 u |p| each, 3 sqrt(3) u |p| together, and |p| <= sqrt(3) of its largest
+// coordinate: 9 u; adding a shift costs another sqrt(3) u.  Rounded up.
+inline constexpr double kInputNoise = 12.0 * kUnitRoundoff;
+
+// Of both bodies, in terms of the largest coordinate of either.
+inline constexpr double kMostNoise = 2.0 * kInputNoise;
+
 // No slack exceeds this part of the reach (or of the speed), so separations, angles and overlaps that are
 // larger are always told apart, however far from the origin.
 inline constexpr double kLargestSlack = 0x1p-42;

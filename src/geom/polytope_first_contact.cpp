@@ -179,6 +179,12 @@ double turn_of(const MovingPair& pair, double width) {
     return width > 0.0 ? std::min(pair.noise() / width, kLargestSlack) : kLargestSlack;
 }
 
+/// Least height of the triangle of two edges of the facet; they are about perpendicular, or make it slender.
+double width_of(const BoxMotion& motion) {
+    const auto [e, f] = motion.half;
+    return e > 0.0 && f > 0.0 ? 2.0 * e * (f / std::hypot(e, f)) * motion.sine : 0.0;
+}
+
 /// Contact within the slack.
 class Nearly {
 public:
@@ -366,14 +372,51 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     } else {
         out = doubtful_contact(cast, t_max, moment, width);
     }
-    if (!contact_set || out.status == ContactStatus::never) {
+    if (contact_set && out.status != ContactStatus::never) {
+        add_points(moment, width, out);
+    }
+    return out;
+}
+
+PolytopeContact contact_of(const BoxMotion& motion, double t_max) {
+    PolytopeContact out = never(true, motion.wide ? Rung::wide : Rung::filter);
+    if (motion.verdict == BoxMotion::Verdict::never) {
         return out;
     }
+    out.last_time = std::min(motion.last_time, t_max);
+    if (motion.verdict == BoxMotion::Verdict::overlapping) {
+        out.status = ContactStatus::overlapping;
+        out.time = out.time_lower = out.time_upper = 0.0;
+        return out;
+    }
+    out.status = ContactStatus::will_touch;
+    out.time = motion.time;
+    out.time_lower = motion.time_lower;
+    out.time_upper = motion.time_upper;
+    out.normal = motion.normal;
+    out.closing_speed = motion.closing_speed;
+    return out;
+}
+
+PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBody& b, double t_max,
+                                             const BoxMotion& known) {
+    PolytopeContact out = contact_of(known, t_max);
+    const bool touches = out.status == ContactStatus::will_touch;
+    const double width = touches ? width_of(known) : 0.0;
+    if (touches && !(width > 0.0)) {
+        return solve(a, b, t_max, true);
+    }
+    pair_.load(a, b);
+    add_points(out.time, width, out);
+    return out;
+}
+
+void PolytopeContactSolver::add_points(double moment, double width, PolytopeContact& out) {
     const double reach = pair_.reach();
     const double rounding = 2.0 * kLowestError * reach;
     if (out.status == ContactStatus::overlapping) {
         out.points = points_.overlapping(pair_, pair_.noise() + rounding);
-        return out;
+        return;
     }
     // Noise turns the plane, and it shifts the time, hence the place.
     ContactSlack slack{};
@@ -385,7 +428,6 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
     const double delay = moment > 0.0 && shift < rate * limit ? shift / rate : moment > 0.0 ? limit : 0.0;
     slack.place = std::min(2.0 * pair_.noise() + delay, limit) + rounding;
     out.points = points_.touching(pair_, out.normal, moment, slack);
-    return out;
 }
 
 PolytopeContact PolytopeContactSolver::doubtful_contact(const LineCast& cast, double t_max, double& moment,

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "geom/box_motion.hpp"
 #include "geom/contact_points.hpp"
 #include "geom/contact_status.hpp"
 #include "geom/exact_contact_points.hpp"
@@ -31,6 +32,9 @@ struct PolytopeContact {
     Rung rung = Rung::filter;
 };
 
+/// What is known from the axes of two boxes, unless that is unclear; without points.
+PolytopeContact contact_of(const BoxMotion& motion, double t_max);
+
 /// Holds scratch memory for polytopes of at most so many vertices.
 class PolytopeContactSolver {
 public:
@@ -39,7 +43,13 @@ public:
     /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
     PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, bool contact_set);
 
+    /// The same, with a contact set, of boxes that are known to meet.
+    PolytopeContact solve(const MovingBody& a, const MovingBody& b, double t_max, const BoxMotion& known);
+
 private:
+    /// Points of contact, `moment` after the start; `width` as of Limit.
+    void add_points(double moment, double width, PolytopeContact& out);
+
     /// Solved exactly, then judged by the slack.
     PolytopeContact doubtful_contact(const LineCast& cast, double t_max, double& moment, double& width);
 
