@@ -10,6 +10,7 @@ from geomsrv._version import __version__
 from geomsrv.answers import (
     Booleans,
     Certificates,
+    CollisionTimes,
     ContactStatus,
     Cost,
     Cull,
@@ -20,6 +21,7 @@ from geomsrv.answers import (
     FrustumRegion,
 )
 from geomsrv.errors import CertificateError, GeometryError, NotAvailableError, SceneError
+from geomsrv.footprint import time_to_collision
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
 from geomsrv.scene import (
     PairContacts,
@@ -60,6 +62,7 @@ __all__ = [
     "Capsule",
     "CertificateError",
     "Certificates",
+    "CollisionTimes",
     "Cone",
     "ContactStatus",
     "Convex",
@@ -107,6 +110,7 @@ __all__ = [
     "distance_to_frustum",
     "first_contact",
     "intersects",
+    "time_to_collision",
     "verify",
     "verify_record",
 ]

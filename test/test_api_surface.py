@@ -55,6 +55,7 @@ first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', co
 distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',),
     certificates=False)
 intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False)
+time_to_collision(footprint, twist, obstacles, *, velocities=None, t_max=inf, tolerance=1e-06)
 verify(answer)
 verify_record(record)
 Scene(*, fixed_frame='world', allowed_pairs=(), transforms=None)
@@ -68,6 +69,7 @@ ATTRIBUTES = {
     "Booleans": "value certain status cost certificates",
     "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain cost "
     "certificates",
+    "CollisionTimes": "status time time_lower time_upper certain first earliest earliest_upper cost",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",
     "SceneUpdate": "add remove clear",
