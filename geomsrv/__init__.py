@@ -23,6 +23,7 @@ from geomsrv.answers import (
 from geomsrv.errors import CertificateError, GeometryError, NotAvailableError, SceneError
 from geomsrv.footprint import time_to_collision
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
+from geomsrv.region import Region
 from geomsrv.scene import (
     PairContacts,
     PairDistances,
@@ -92,6 +93,7 @@ __all__ = [
     "Polygon",
     "Polygons",
     "Polytopes",
+    "Region",
     "Scene",
     "SceneCull",
     "SceneError",

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 from geomsrv import _core, _validate
 from geomsrv.answers import CollisionTimes, ContactStatus, Cost, FloatArray
 from geomsrv.errors import GeometryError
+from geomsrv.region import Region
 from geomsrv.shapes import Polygon, Polygons
 
 __all__ = ["time_to_collision"]
 
 
 def time_to_collision(
-    footprint: ArrayLike | Polygon,
+    footprint: ArrayLike | Polygon | Region,
     twist: ArrayLike,
     obstacles: ArrayLike | Polygons,
     *,
@@ -31,8 +32,8 @@ def time_to_collision(
 
     Parameters
     ----------
-    footprint : (m, 2) float or Polygon
-        Convex counter-clockwise ring [m], robot frame.
+    footprint : (m, 2) float, Polygon or Region
+        Convex counter-clockwise ring [m], robot frame; or a region, convex or not.
     twist : (3,) float
         Velocity of the frame's origin, x and y [m/s], and yaw rate [rad/s], all in the robot's frame, which turns: with
         a yaw rate the robot drives along an arc.
@@ -70,18 +71,24 @@ def time_to_collision(
     array([     nan,      nan, 2.939201])
     """
     start = time.perf_counter_ns()
-    ring = _ring(footprint)
+    region = footprint if isinstance(footprint, Region) else None
+    rings = [_ring(footprint)] if not isinstance(footprint, Region) else _rings(footprint)
     motion = _validate.floats(twist, "twist", (3,))
     end = _validate.limit(t_max, "t_max")
     step = _validate.scalar(tolerance, "tolerance", positive=True)
     speeds = None if velocities is None else _validate.array(velocities, "velocities")
+    points = None
     if isinstance(obstacles, Polygons):
         rest = _speeds(speeds, len(obstacles))
-        status, lower, upper, closed = _polygons(ring, motion, obstacles, rest, end, step)
+        found = [_polygons(ring, motion, obstacles, rest, end, step) for ring in rings]
     else:
         points = _validate.floats(obstacles, "obstacles", (None, 2))
         rest = _speeds(speeds, len(points))
-        status, lower, upper, closed = _core.points_on_twist(ring, motion, points, rest, end, step)
+        found = [_core.points_on_twist(ring, motion, points, rest, end, step) for ring in rings]
+    status, lower, upper = found[0][:3]
+    closed = min(piece[3] for piece in found)
+    if region is not None:
+        status, lower, upper = _union(region, found, points, step)
     certain = (status < ContactStatus.UNSUPPORTED) & ((status != ContactStatus.TOUCHING) | (upper == 0.0))
     return CollisionTimes(
         status=status,
@@ -115,6 +122,31 @@ def _polygons(
     bodies = (ring, alone), (obstacles.vertices, obstacles.offsets)
     found = _core.first_contact_turning(*bodies, robot, others, end, step, np.array([[0.0, 0.0, drift]]))
     return found[0], found[1], found[2], 0
+
+
+def _union(
+    region: Region, found: list[Any], points: FloatArray | None, step: float
+) -> tuple[Any, FloatArray, FloatArray]:
+    """Of all pieces the first contact."""
+    status, lower, upper = (np.array([piece[k] for piece in found]) for k in range(3))
+    first = np.where(status == ContactStatus.NEVER, np.inf, lower).argmin(axis=0)
+    every = np.arange(status.shape[1])
+    outcome = status[first, every]
+    low, high = lower[first, every], np.fmin.reduce(upper, axis=0)
+    apart = (outcome == ContactStatus.WILL_TOUCH) | (outcome == ContactStatus.GRAZING)
+    outcome[apart] = np.where((high - low)[apart] <= step, ContactStatus.WILL_TOUCH, ContactStatus.GRAZING)
+    outcome[(status == ContactStatus.OVERLAPPING).any(axis=0)] = ContactStatus.OVERLAPPING
+    if points is not None:
+        # On the seam of two pieces it is inside.
+        for i in np.flatnonzero((outcome == ContactStatus.TOUCHING) & (high == 0.0)):
+            if not region.on_border(points[i]):
+                outcome[i] = ContactStatus.OVERLAPPING
+    return outcome, low, high
+
+
+def _rings(region: Region) -> list[FloatArray]:
+    pieces = region.pieces
+    return [pieces[i] for i in range(len(pieces))]
 
 
 def _ring(footprint: ArrayLike | Polygon) -> FloatArray:

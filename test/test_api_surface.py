@@ -47,6 +47,7 @@ Triangle(a, b, c)
 Segment(a, b)
 Point(p)
 Polygon(vertices)
+Region(outline, holes=())
 cull(frustum, boxes, *, accuracy='float64', certificates=False)
 distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False)
 first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', contact_set=True,
