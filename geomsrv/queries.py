@@ -23,6 +23,7 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
+from geomsrv.region import Region, first_contact_regions
 from geomsrv.shapes import (
     Boxes,
     Capsule,
@@ -198,8 +199,8 @@ def distance_to_frustum(
 
 
 def first_contact(
-    a: Boxes | Polygons | Polytopes,
-    b: Boxes | Polygons | Polytopes,
+    a: Boxes | Polygons | Polytopes | Region,
+    b: Boxes | Polygons | Polytopes | Region,
     velocity_a: ArrayLike,
     velocity_b: ArrayLike,
     *,
@@ -218,7 +219,8 @@ def first_contact(
     Parameters
     ----------
     a, b : Polygons (2D) or Polytopes (3D); Boxes, too, if anything turns
-        n against n, or one against n.
+        n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another;
+        only without a contact set, and piece by piece, so at the cost of all pairs of pieces.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
@@ -279,6 +281,19 @@ def first_contact(
     (0.523599, [[0.866025, 0.5]])
     """
     start = time.perf_counter_ns()
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {
+            "t_max": t_max,
+            "accuracy": accuracy,
+            "contact_set": contact_set,
+            "certificates": certificates,
+            "angular_velocity_a": angular_velocity_a,
+            "angular_velocity_b": angular_velocity_b,
+            "center_a": center_a,
+            "center_b": center_b,
+            "tolerance": tolerance,
+        }
+        return first_contact_regions(first_contact, a, b, (velocity_a, velocity_b), options)
     if turns(angular_velocity_a, angular_velocity_b):
         return first_contact_turning(
             (a, b),

@@ -4,20 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _validate
-from geomsrv.errors import GeometryError
+from geomsrv.answers import ContactStatus, Cost, FirstContacts
+from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import FloatArray, Polygons
 
-__all__ = ["Region"]
+__all__ = ["Region", "first_contact_regions"]
 
 Corner = tuple[int, int]  # in units so small that all coordinates are whole numbers
 
@@ -97,6 +100,66 @@ class Region:
         """Whether a point is on a ring, exactly."""
         x, y = (Fraction(x) * self._unit for x in _validate.floats(point, "point", (2,)).tolist())
         return any(_on(a, b, (x, y)) for ring in self._whole for a, b in _edges(ring))
+
+
+def first_contact_regions(
+    ask: Callable[..., FirstContacts], a: Any, b: Any, velocities: tuple[Any, Any], options: dict[str, Any]
+) -> FirstContacts:
+    """The answer of `first_contact`, which is passed in, where a or b is a region: the first of all pairs of pieces."""
+    start = time.perf_counter_ns()
+    for body, name in ((a, "a"), (b, "b")):
+        if not isinstance(body, (Region, Polygons)):
+            raise GeometryError(f"{name} must be Region or Polygons, got {type(body).__name__}")
+    if options["contact_set"]:
+        raise NotAvailableError("the contact set of a Region is not available yet: pass contact_set=False")
+    if options["certificates"]:
+        raise NotAvailableError("certificates of a Region are not available yet")
+    sizes = [1 if isinstance(body, Region) else len(body) for body in (a, b)]
+    if sizes[0] != sizes[1] and 1 not in sizes:
+        raise GeometryError(
+            f"a and b must have the same length, or one of them length 1; got {sizes[0]} and {sizes[1]}"
+        )
+    count = sizes[1] if sizes[0] == 1 else sizes[0]
+    batches = [body.pieces if isinstance(body, Region) else body for body in (a, b)]
+    found = []
+    for center, body in (("center_a", a), ("center_b", b)):
+        if isinstance(body, Region) and options[center] is None:
+            # All pieces turn about one point.
+            options = {**options, center: 0.5 * body.outline.min(axis=0) + 0.5 * body.outline.max(axis=0)}
+    for i in range(len(batches[0]) if isinstance(a, Region) else 1):
+        for k in range(len(batches[1]) if isinstance(b, Region) else 1):
+            one = Polygons.from_list([batches[0][i]]) if isinstance(a, Region) else a
+            two = Polygons.from_list([batches[1][k]]) if isinstance(b, Region) else b
+            found.append(ask(one, two, *velocities, **options))
+    status, lower, upper, last, certain, middle = (
+        np.array([getattr(answer, name) for answer in found])
+        for name in ("status", "time_lower", "time_upper", "last_time", "certain", "time")
+    )
+    first = np.where(status == ContactStatus.NEVER, np.inf, lower).argmin(axis=0)
+    every = np.arange(count)
+    outcome, low, high = status[first, every], lower[first, every], np.fmin.reduce(upper, axis=0)
+    outcome[(outcome == ContactStatus.GRAZING) & (high - low <= options["tolerance"])] = ContactStatus.WILL_TOUCH
+    overlap = status == ContactStatus.OVERLAPPING
+    outcome[overlap.any(axis=0)] = ContactStatus.OVERLAPPING
+    # Bodies that touch two pieces may be thin ones on a seam, which is inside.
+    seam = (outcome == ContactStatus.TOUCHING) & ((status == ContactStatus.TOUCHING).sum(axis=0) > 1)
+    sure = (certain.all(axis=0) & ~seam) | (overlap & certain).any(axis=0)
+    counts: dict[str, int] = {}
+    for answer in found:
+        for stage, n in answer.cost.counts.items():
+            counts[stage] = counts.get(stage, 0) + n
+    return FirstContacts(
+        status=outcome,
+        time=np.clip(middle[first, every], low, high),
+        time_lower=low,
+        time_upper=high,
+        last_time=np.fmax.reduce(last, axis=0),
+        normal=np.array([answer.normal for answer in found])[first, every],
+        points=np.zeros((0, 2)),
+        point_offsets=np.zeros(count + 1, np.int64),
+        certain=sure,
+        cost=Cost(time.perf_counter_ns() - start, found[0].cost.accuracy, counts),
+    )
 
 
 def _turn(a: Any, b: Any, c: Any) -> Any:

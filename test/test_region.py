@@ -123,3 +123,59 @@ def test_first_of_all_pieces(rng: np.random.Generator) -> None:
         first = np.fmin.reduce([part.time_lower for part in parts])
         assert np.array_equal(whole.time, first, equal_nan=True)
         assert (whole.status == gs.WILL_TOUCH).any() and (whole.status == gs.NEVER).any()
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.7])
+def test_first_contact_of_regions(rng: np.random.Generator, rate: float) -> None:
+    """A bolt that goes into a fork meets its back; what flies by, nothing."""
+    fork = gs.Region(FORK)
+    bolts = gs.Polygons.from_list([[(2, -0.1), (3, -0.1), (3, 0.1), (2, 0.1)], [(2, 1), (3, 1), (3, 2), (2, 2)]])
+    answer = gs.first_contact(fork, bolts, (0, 0), (-1, 0), contact_set=False)
+    assert answer.status.tolist() == [1, 0] and answer.certain.all()
+    assert answer.time_lower[0] <= 1.8 <= answer.time_upper[0] + 1e-15 and answer.normal[0].tolist() == [1, 0]
+    seen = []
+    for _ in range(30):
+        one, two = gs.Region(star(rng, 7)), gs.Region(star(rng, 6, rng.uniform(-2, 2, 2)))
+        motion: dict[str, Any] = {"t_max": 3.0, "contact_set": False, "tolerance": 1e-9}
+        if rate:
+            motion |= {"angular_velocity_a": rate, "center_a": (0, 0), "center_b": (0, 0)}
+        velocity = rng.normal(size=2)
+        whole = gs.first_contact(one, two, velocity, (0, 0), **motion)
+        parts = [
+            gs.first_contact(gs.Polygons.from_list([p]), gs.Polygons.from_list([q]), velocity, (0, 0), **motion)
+            for p in one.pieces
+            for q in two.pieces
+        ]
+        upper = np.fmin.reduce([part.time_upper[0] for part in parts])
+        lower = np.fmin.reduce([part.time_lower[0] for part in parts])
+        assert np.array_equal([whole.time_lower[0], whole.time_upper[0]], [lower, upper], equal_nan=True)
+        back = gs.first_contact(two, one, (0, 0), velocity, **_swapped(motion))
+        assert back.status == whole.status
+        seen.append(int(whole.status[0]))
+    assert {0, 1, 3} <= set(seen)
+
+
+def _swapped(motion: dict[str, Any]) -> dict[str, Any]:
+    other = {"a": "b", "b": "a"}
+    return {name[:-1] + other[name[-1]] if name[-2] == "_" else name: value for name, value in motion.items()}
+
+
+def test_regions_turn_about_one_point() -> None:
+    """By default the middle of the outline, as that of polygons."""
+    square = [(0, 0), (2, 0), (2, 2), (0, 2)]
+    wall = gs.Polygons.from_list([[(2.3, -5), (3, -5), (3, 5), (2.3, 5)]])
+    frame = gs.Region(square, [[(0.5, 0.5), (1.5, 0.5), (1.5, 1.5), (0.5, 1.5)]])
+    motion: dict[str, Any] = {"angular_velocity_a": 1.0, "contact_set": False}
+    one = gs.first_contact(gs.Polygons.from_list([square]), wall, (0, 0), (0, 0), **motion)
+    two = gs.first_contact(frame, wall, (0, 0), (0, 0), **motion)
+    assert two.status == gs.WILL_TOUCH and abs(two.time - one.time) < 2e-6
+
+
+def test_what_regions_do_not_answer() -> None:
+    region, square = gs.Region(ANGLE), gs.Polygons.from_list([FRAME[0]])
+    with pytest.raises(gs.NotAvailableError, match="contact set of a Region"):
+        gs.first_contact(region, square, (0, 0), (0, 0))
+    with pytest.raises(gs.NotAvailableError, match="certificates of a Region"):
+        gs.first_contact(square, region, (0, 0), (0, 0), contact_set=False, certificates=True)
+    with pytest.raises(gs.GeometryError, match="b must be Region or Polygons, got Boxes"):
+        gs.first_contact(region, gs.Boxes([[0, 0, 0]], [np.eye(3)], [[1, 1, 1]]), (0, 0), (0, 0))
