@@ -23,7 +23,7 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
-from geomsrv.region import Region, first_contact_regions
+from geomsrv.region import Region, distance_regions, first_contact_regions, intersects_regions
 from geomsrv.shapes import (
     Boxes,
     Capsule,
@@ -342,8 +342,8 @@ def first_contact(
 
 
 def distance(
-    a: Shape | Batch,
-    b: Shape | Batch,
+    a: Shape | Batch | Region,
+    b: Shape | Batch | Region,
     poses_ab: ArrayLike | None = None,
     *,
     accuracy: str = "float64",
@@ -355,7 +355,8 @@ def distance(
     Parameters
     ----------
     a, b : Shape or Frustum with `poses_ab`; otherwise batches (Boxes, Polygons, Polytopes, Frustum)
-        Two shapes at n relative poses, or two batches in world coordinates, n against n or one against n.
+        Two shapes at n relative poses, or two batches in world coordinates, n against n or one against n.  A Region is
+        one body, in world coordinates here, against Polygons or another, without penetration.
     poses_ab : (n, 7) or (7,) float, optional
         Poses of b in a: x y z [m], qx qy qz qw.
     accuracy : str
@@ -387,6 +388,9 @@ def distance(
     >>> gs.distance(gs.Sphere(1.0), gs.Sphere(1.0), [1.5, 0, 0, 0, 0, 0, 1], want=("penetration",)).distance
     array([-0.5])
     """
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
+        return distance_regions(distance, a, b, want, options)
     start = time.perf_counter_ns()
     effects = _validate.want(want, ("distance", "witness", "penetration"))
     signed, poses = "penetration" in effects, None
@@ -432,8 +436,8 @@ def distance(
 
 
 def intersects(
-    a: Shape | Batch,
-    b: Shape | Batch,
+    a: Shape | Batch | Region,
+    b: Shape | Batch | Region,
     poses_ab: ArrayLike | None = None,
     *,
     accuracy: str = "float64",
@@ -467,6 +471,9 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
+        return intersects_regions(intersects, a, b, options)
     if poses_ab is None and isinstance(a, Polygons):
         answer, meet, certain = _polygon_distance(a, b, True, accuracy, time.perf_counter_ns())
         proven = _validate.certificates(certificates, answer.cost.accuracy)

@@ -5,22 +5,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _validate
-from geomsrv.answers import ContactStatus, Cost, FirstContacts
+from geomsrv.answers import Booleans, ContactStatus, Cost, Distances, FirstContacts
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import FloatArray, Polygons
 
-__all__ = ["Region", "first_contact_regions"]
+__all__ = ["Region", "distance_regions", "first_contact_regions", "intersects_regions"]
 
 Corner = tuple[int, int]  # in units so small that all coordinates are whole numbers
 
@@ -107,30 +107,16 @@ def first_contact_regions(
 ) -> FirstContacts:
     """The answer of `first_contact`, which is passed in, where a or b is a region: the first of all pairs of pieces."""
     start = time.perf_counter_ns()
-    for body, name in ((a, "a"), (b, "b")):
-        if not isinstance(body, (Region, Polygons)):
-            raise GeometryError(f"{name} must be Region or Polygons, got {type(body).__name__}")
+    count = _common(a, b)
     if options["contact_set"]:
         raise NotAvailableError("the contact set of a Region is not available yet: pass contact_set=False")
     if options["certificates"]:
         raise NotAvailableError("certificates of a Region are not available yet")
-    sizes = [1 if isinstance(body, Region) else len(body) for body in (a, b)]
-    if sizes[0] != sizes[1] and 1 not in sizes:
-        raise GeometryError(
-            f"a and b must have the same length, or one of them length 1; got {sizes[0]} and {sizes[1]}"
-        )
-    count = sizes[1] if sizes[0] == 1 else sizes[0]
-    batches = [body.pieces if isinstance(body, Region) else body for body in (a, b)]
-    found = []
     for center, body in (("center_a", a), ("center_b", b)):
         if isinstance(body, Region) and options[center] is None:
             # All pieces turn about one point.
             options = {**options, center: 0.5 * body.outline.min(axis=0) + 0.5 * body.outline.max(axis=0)}
-    for i in range(len(batches[0]) if isinstance(a, Region) else 1):
-        for k in range(len(batches[1]) if isinstance(b, Region) else 1):
-            one = Polygons.from_list([batches[0][i]]) if isinstance(a, Region) else a
-            two = Polygons.from_list([batches[1][k]]) if isinstance(b, Region) else b
-            found.append(ask(one, two, *velocities, **options))
+    found = [ask(one, two, *velocities, **options) for one, two in _pairs(a, b)]
     status, lower, upper, last, certain, middle = (
         np.array([getattr(answer, name) for answer in found])
         for name in ("status", "time_lower", "time_upper", "last_time", "certain", "time")
@@ -144,10 +130,6 @@ def first_contact_regions(
     # Bodies that touch two pieces may be thin ones on a seam, which is inside.
     seam = (outcome == ContactStatus.TOUCHING) & ((status == ContactStatus.TOUCHING).sum(axis=0) > 1)
     sure = (certain.all(axis=0) & ~seam) | (overlap & certain).any(axis=0)
-    counts: dict[str, int] = {}
-    for answer in found:
-        for stage, n in answer.cost.counts.items():
-            counts[stage] = counts.get(stage, 0) + n
     return FirstContacts(
         status=outcome,
         time=np.clip(middle[first, every], low, high),
@@ -158,8 +140,88 @@ def first_contact_regions(
         points=np.zeros((0, 2)),
         point_offsets=np.zeros(count + 1, np.int64),
         certain=sure,
-        cost=Cost(time.perf_counter_ns() - start, found[0].cost.accuracy, counts),
+        cost=_cost(found, start),
     )
+
+
+def distance_regions(ask: Callable[..., Distances], a: Any, b: Any, want: Any, options: dict[str, Any]) -> Distances:
+    """The answer of `distance` where a or b is a region: that of the nearest pair of pieces."""
+    start = time.perf_counter_ns()
+    _refuse(options)
+    effects = _validate.want(want, ("distance", "witness", "penetration"))
+    if "penetration" in effects:
+        raise NotAvailableError("how deep a Region is penetrated is no minimum over its pieces, and not available")
+    every = np.arange(_common(a, b))
+    found = [ask(one, two, want=want, **options) for one, two in _pairs(a, b)]
+    gap, lower, upper, status = (
+        np.array([getattr(answer, name) for answer in found]) for name in ("distance", "lower", "upper", "status")
+    )
+    first = gap.argmin(axis=0)
+    point_a, point_b, normal = (
+        np.array([getattr(answer, name) for answer in found])[first, every] for name in ("point_a", "point_b", "normal")
+    )
+    least, most = lower.min(axis=0), upper.min(axis=0)
+    return Distances(
+        np.clip(gap[first, every], least, most),
+        least,
+        most,
+        point_b,
+        status.max(axis=0),
+        _cost(found, start),
+        point_a,
+        normal,
+    )
+
+
+def intersects_regions(ask: Callable[..., Booleans], a: Any, b: Any, options: dict[str, Any]) -> Booleans:
+    """The answer of `intersects` where a or b is a region: whether any pair of pieces meets."""
+    start = time.perf_counter_ns()
+    _refuse(options)
+    _common(a, b)
+    found = [ask(one, two, **options) for one, two in _pairs(a, b)]
+    value, certain, status = (
+        np.array([getattr(answer, name) for answer in found]) for name in ("value", "certain", "status")
+    )
+    meet = value.any(axis=0)
+    sure = np.where(meet, (value & certain).any(axis=0), certain.all(axis=0))
+    return Booleans(meet, sure, status.max(axis=0), _cost(found, start))
+
+
+def _refuse(options: dict[str, Any]) -> None:
+    if options.get("poses_ab") is not None:
+        raise GeometryError("poses_ab must be left out: a Region is in world coordinates here")
+    if options["certificates"]:
+        raise NotAvailableError("certificates of a Region are not available yet")
+
+
+def _common(a: Any, b: Any) -> int:
+    """How many items; a region is one."""
+    for body, name in ((a, "a"), (b, "b")):
+        if not isinstance(body, (Region, Polygons)):
+            raise GeometryError(f"{name} must be Region or Polygons, got {type(body).__name__}")
+    one, two = (1 if isinstance(body, Region) else len(body) for body in (a, b))
+    if one != two and 1 not in (one, two):
+        raise GeometryError(f"a and b must have the same length, or one of them length 1; got {one} and {two}")
+    return two if one == 1 else one
+
+
+def _pairs(a: Any, b: Any) -> Iterator[tuple[Polygons, Polygons]]:
+    """Every piece of one against every piece of the other; polygons stay together."""
+
+    def parts(body: Any) -> list[Polygons]:
+        if not isinstance(body, Region):
+            return [body]
+        return [Polygons.from_list([body.pieces[i]]) for i in range(len(body.pieces))]
+
+    return product(parts(a), parts(b))
+
+
+def _cost(found: Sequence[Any], start: int) -> Cost:
+    counts: dict[str, int] = {}
+    for answer in found:
+        for stage, n in answer.cost.counts.items():
+            counts[stage] = counts.get(stage, 0) + n
+    return Cost(time.perf_counter_ns() - start, found[0].cost.accuracy, counts)
 
 
 def _turn(a: Any, b: Any, c: Any) -> Any:

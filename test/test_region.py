@@ -179,3 +179,33 @@ def test_what_regions_do_not_answer() -> None:
         gs.first_contact(square, region, (0, 0), (0, 0), contact_set=False, certificates=True)
     with pytest.raises(gs.GeometryError, match="b must be Region or Polygons, got Boxes"):
         gs.first_contact(region, gs.Boxes([[0, 0, 0]], [np.eye(3)], [[1, 1, 1]]), (0, 0), (0, 0))
+
+
+@pytest.mark.parametrize("accuracy", ["float64", "exact"])
+def test_distance_of_regions(rng: np.random.Generator, accuracy: str) -> None:
+    """A hole is outside; so is what the prongs of a fork hold between them."""
+    frame, fork = gs.Region(*FRAME), gs.Region(FORK)
+    probes = gs.Polygons.from_list([[(2, 2)], [(2, 1)], [(2, 0.5)], [(1.5, 2), (2.25, 2)], [(6, 2)]])
+    answer = gs.distance(frame, probes, accuracy=accuracy)
+    assert answer.distance.tolist() == [1, 0, 0, 0.5, 2] and (answer.lower <= answer.upper).all()
+    meet = gs.intersects(probes, frame, accuracy=accuracy)
+    assert meet.value.tolist() == [False, True, True, False, False]
+    assert meet.certain[[0, 2, 3, 4]].all() and (accuracy != "exact" or meet.certain.all())
+    pole = gs.Polygons.from_list([[(0.7, 0.0)]])
+    assert abs(gs.distance(fork, pole, accuracy=accuracy).distance[0] - 0.2) < 1e-15
+    for _ in range(10):
+        one, two = gs.Region(star(rng, 7)), gs.Region(star(rng, 6, rng.uniform(-2, 2, 2)))
+        answer, meet = gs.distance(one, two, accuracy=accuracy), gs.intersects(one, two, accuracy=accuracy)
+        assert meet.value[0] == (answer.distance[0] == 0.0)
+        if not meet.value[0]:
+            assert abs(np.hypot(*(answer.point_b - answer.point_a)[0]) - answer.distance[0]) < 1e-14
+
+
+def test_depth_is_refused() -> None:
+    region = gs.Region(ANGLE)
+    with pytest.raises(gs.NotAvailableError, match="how deep a Region is penetrated"):
+        gs.distance(region, region, want=("penetration",))
+    with pytest.raises(gs.GeometryError, match="poses_ab must be left out"):
+        gs.distance(region, region, (0, 0, 0, 0, 0, 0, 1))
+    with pytest.raises(gs.NotAvailableError, match="certificates of a Region"):
+        gs.intersects(region, region, certificates=True)
