@@ -22,7 +22,7 @@ soak: build  ## run all tests, the long ones too, with larger random counts
 	GEOMSRV_SOAK=1 $(BIN)/pytest -m "soak or not soak" --timeout 7200 $(ARGS)
 
 hard: build  ## judge the hard cases of every class by exact arithmetic; writes docs/hard_cases.md
-	PYTHONPATH=test $(BIN)/python -m hard $(ARGS)
+	PYTHONPATH=test $(BIN)/python -P -m hard $(ARGS)
 
 demo: build  ## a real robot, a node and a client; writes a picture
 	$(BIN)/geomsrv demo $(ARGS)

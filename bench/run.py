@@ -113,6 +113,11 @@ def declare(quick: bool) -> list[Scenario]:
             (lambda: gs.time_to_collision(scenarios.FOOTPRINT, DRIVE, scan, t_max=2.0), len(scan)),
         ),
     ]
+    for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
+        given = moving(100_000 // cut)
+        touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))
+        label = f"first contact, {name}, {touch:.0%} hits"
+        table.append(Scenario(label, None, (lambda given=given: gs.first_contact(*given), len(given[0]))))
     far = scenarios.relative_poses(10_000 // cut, 0.35, 1.0)
     near = scenarios.relative_poses(10_000 // cut, 0.0, 0.1)
     for name, (p, q) in scenarios.SHAPE_PAIRS.items():
@@ -208,6 +213,11 @@ def prices(quick: bool) -> list[Price]:
             lambda **k: gs.first_contact(a, b, velocity_a, velocity_b, **k),
         ),
     ]
+    for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
+        given = moving(few)
+        calls.append(
+            (f"first contact of {name}", 2.0, None, few, lambda given=given, **k: gs.first_contact(*given, **k))
+        )
     far, near = scenarios.relative_poses(few, 0.35, 1.0), scenarios.relative_poses(few, 0.0, 0.1)
     for name in ("box-box", "hull16-hull16", "hull64-hull64"):
         p, q = scenarios.SHAPE_PAIRS[name]

@@ -86,6 +86,44 @@ def turning_boxes(n: int = 20_000) -> tuple[gs.Boxes, gs.Boxes, dict[str, np.nda
     return batch(np.zeros((n, 3))), batch(center_b), motion
 
 
+Moving = tuple[gs.Boxes | gs.Polytopes, gs.Boxes | gs.Polytopes, np.ndarray, np.ndarray]
+
+
+def moving_boxes(n: int = 100_000) -> Moving:
+    """Pairs of boxes of about 1 m in any orientation, a few metres apart, mostly on collision course."""
+    rng = np.random.default_rng(SEED)
+    center_b, velocity_a, velocity_b = _courses(rng, n)
+    batches = [
+        gs.Boxes.from_poses(np.hstack([center, _unit(rng.normal(size=(n, 4)))]), rng.uniform(0.3, 0.9, (n, 3)))
+        for center in (np.zeros((n, 3)), center_b)
+    ]
+    return *batches, velocity_a, velocity_b
+
+
+def moving_hulls(n: int = 100_000) -> Moving:
+    """The same with convex hulls of 8 to 32 points on an ellipsoid."""
+    rng = np.random.default_rng(SEED)
+    center_b, velocity_a, velocity_b = _courses(rng, n)
+    batches = []
+    for center in (np.zeros((n, 3)), center_b):
+        sizes = rng.integers(8, 33, n)
+        item = np.repeat(np.arange(n), sizes)
+        points = _unit(rng.normal(size=(len(item), 3))) * rng.uniform(0.4, 1.2, (n, 3))[item]
+        batches.append(gs.Polytopes(points + center[item], np.concatenate([[0], np.cumsum(sizes)])))
+    return *batches, velocity_a, velocity_b
+
+
+def _courses(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where b starts, and both velocities."""
+    center_b = rng.uniform(-5.0, 5.0, (n, 3))
+    velocity_b = rng.uniform(0.5, 2.0, (n, 1)) * (_unit(-center_b) + rng.normal(scale=0.2, size=(n, 3)))
+    return center_b, rng.normal(scale=0.1, size=(n, 3)), velocity_b
+
+
+def _unit(rows: np.ndarray) -> np.ndarray:
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
 def relative_poses(n: int, low: float, high: float) -> np.ndarray:
     """(n, 7) random orientations, translations of length `low` to `high`."""
     rng = np.random.default_rng(SEED)

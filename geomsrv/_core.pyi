@@ -13,6 +13,9 @@ _B = NDArray[np.bool_]
 _Distances = tuple[_F, _F, _F, _F, _F, _F, _U, _U]
 # the same, then as evidence the simplex (n, 4, 2) of vertices of the difference
 _ProvenDistances = tuple[_F, _F, _F, _F, _F, _F, _U, _U, NDArray[np.int32] | None]
+# status, time, time_lower, time_upper, last_time (n,), normal (n, 3), points (k, 3), point_offsets (n + 1,), certain,
+# closing_speed (n,), items per rung
+_Contacts = tuple[_U, _F, _F, _F, _F, _F, _F, _I, _B, _F, _Rungs]
 # which algorithm had the last word (Stage in separation.hpp) and its iterations, for tests
 _Stages = tuple[_U, _I]
 # items answered by bounding volumes, by the filter, in double-double, exactly
@@ -58,6 +61,15 @@ def points_on_twist(
     ring: _F, twist: _F, points: _F, velocities: _F, t_max: float, tolerance: float
 ) -> tuple[_U, _F, _F, int]: ...
 def turn_of_twist(twist: _F) -> tuple[float, float, float, float]: ...
+def first_contact_world(
+    a: tuple[_F | _I, ...],
+    b: tuple[_F | _I, ...],
+    velocity_a: _F,
+    velocity_b: _F,
+    t_max: float,
+    contact_set: bool,
+    accuracy: str = "float64",
+) -> _Contacts: ...
 def distance_polygons(
     vertices_a: _F, offsets_a: _I, vertices_b: _F, offsets_b: _I, penetration: bool, accuracy: str = "float64"
 ) -> tuple[_F, _F, _F, _F, _F, _F, _U, _B, _B, _Rungs]: ...

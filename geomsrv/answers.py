@@ -279,7 +279,8 @@ class FirstContacts(_Certified):
         Unit contact normal from a to b at ``time``; NaN where there is none.
     points : (k, d) float64, point_offsets : (n + 1,) int64
         Contact set of item i: ``points[point_offsets[i]:point_offsets[i + 1]]``, one point, the two ends of a segment,
-        or the counter-clockwise intersection polygon of bodies that overlap at the start.
+        or the counter-clockwise intersection polygon of polygons that overlap at the start.  Of solids also a polygon,
+        counter-clockwise about the normal, or the vertices of what they share if they overlap at the start.
     certain : (n,) bool
         True where exact arithmetic is proven to give the same ``status``.
     message : str
@@ -296,8 +297,18 @@ class FirstContacts(_Certified):
     points: FloatArray
     point_offsets: IntArray
     certain: BoolArray
+    _closing_speed: FloatArray | Callable[[], FloatArray] = field(repr=False)
     cost: Cost
     message: str = ""
+
+    @cached_property
+    def closing_speed(self) -> FloatArray:
+        """(n,) float64: speed along the normal at which the bodies approach at ``time`` [m/s].
+
+        < 0 where they part; NaN where there is no normal.  Of polygons it is that along ``normal`` as it stands, in
+        float64, on first use.
+        """
+        return self._closing_speed() if callable(self._closing_speed) else self._closing_speed
 
 
 @dataclass(frozen=True, eq=False)

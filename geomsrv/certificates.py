@@ -108,7 +108,7 @@ def _least_upper(a: Record, b: Record) -> float:
 
 
 def certify_contacts(a: Any, b: Any, velocities: tuple[FloatArray, FloatArray], t_max: float) -> Prover:
-    """Records of `FirstContacts` of polygons."""
+    """Records of `FirstContacts`."""
 
     def record(answer: FirstContacts, i: int) -> Record:
         sides = _item(a, i), _item(b, i)
@@ -120,7 +120,10 @@ def certify_contacts(a: Any, b: Any, velocities: tuple[FloatArray, FloatArray], 
         claim: Record = {"status": status, "t_max": t_max}
         if status != "NEVER":
             claim |= {name: float(getattr(answer, name)[i]) for name in ("time_lower", "time", "time_upper")}
-        return _record("first_contact", *sides, claim, evidence_of_contact(*sides, status, t_max))
+        near: dict[str, Any] = {}
+        if not isinstance(a, Polygons) and status != "NEVER":
+            near = {"begin": claim["time_lower"], "normal": answer.normal[i].tolist()}
+        return _record("first_contact", *sides, claim, evidence_of_contact(*sides, status, t_max, **near))
 
     return record
 

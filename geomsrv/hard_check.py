@@ -149,14 +149,21 @@ def check(
     return report
 
 
+#: Shapes whose first contact in translation is answered; what is asked about it in a file is judged by the tests.
+FOLLOWED = frozenset({"box", "convex", "segment", "triangle"})
+
+
 def unsupported(path: Path) -> dict[tuple[str, str], list[str]]:
     """Names of a file's cases that the engine has no query or no kernel for, by kind and shapes."""
     answered = {case.name for case in read(path) if case.truth and judge(case, "float64", case.truth)}
     found: dict[tuple[str, str], list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         record = json.loads(line)
+        kinds = [shape["type"] for shape in record.get("shapes", ())]
+        if record["kind"] == "toi" and FOLLOWED.issuperset(kinds):
+            continue
         if record["id"] not in answered and record.get("complete_inputs", True):
-            shapes = " – ".join(sorted(shape["type"] for shape in record.get("shapes", ())))
+            shapes = " – ".join(sorted(kinds))
             found.setdefault((record["kind"], shapes), []).append(record["id"])
     return dict(sorted(found.items()))
 

@@ -11,8 +11,9 @@ Polygons are placed in the plane once, and those numbers are taken literally.  S
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from typing import Any, Self
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
-from geomsrv.queries import RUNGS
+from geomsrv.queries import RUNGS, SOLID_MOTION_TIERS
 from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 
 __all__ = [
@@ -28,7 +29,9 @@ __all__ = [
     "DistanceRows",
     "distance_rows",
     "first_contact_rows",
+    "followed_solids",
     "placed_distances",
+    "placed_hulls",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -44,11 +47,11 @@ __all__ = [
 # counts 22 u, r_b 22 + 22 + 20 = 64 u, |p_ab| 22 u + 6 u for its own arithmetic; half as much again is added.
 RELATIVE_POSE_ROUNDING = 96.0 * ROUNDOFF
 
-# Shifting a ring: velocity difference 1 u, product 1 u, sum 1 u of numbers up to twice the larger coordinate, in
-# two coordinates.
+# Shifting a body: velocity difference 1 u, product 1 u, sum 1 u of numbers up to twice the larger coordinate, in
+# up to three coordinates.
 SHIFT_ROUNDING = 16.0 * ROUNDOFF
 
-# Speed along a normal, as a share of the velocity: its difference, two products and a sum take 4 u; a unit normal
+# Speed along a normal, as a share of the velocity: its difference, three products and two sums take 6 u; a unit normal
 # is good to 4 u in each part; rounded up.
 SPEED_ROUNDING = 16.0 * ROUNDOFF
 
@@ -63,6 +66,7 @@ NO_DISTANCE = "distance {} is unsupported in this version"
 NO_ROTATION = "first contact of a polygon with angular velocity is unsupported"
 UNPREDICTABLE = "first contact is unsupported: {}"
 NO_MOTION = "first contact of moving solids ({}) is unsupported"
+NO_TURNING = "first contact of solids with angular velocity ({}) is unsupported"
 
 _NO_PAIRS = np.zeros((0, 2), np.int64)
 
@@ -284,12 +288,16 @@ def first_contact_rows(
     planar = world.planar[pairs[:, 0]]
     # Whatever turns, or moves in a way that nobody knows, is still where it is at the start.
     turning = world.turns[pairs].any(axis=1) & (horizon > 0.0)
-    sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar]
-    if len(sliding) + len(spinning):
-        count_kinds(world, pairs[planar], counts)
+    moving = ~planar & ~turning & (horizon > 0.0) & followed_solids(world)[pairs].all(axis=1)
+    moving &= world.velocity_uncertainty[pairs].any(axis=1) | _relative_velocity(world, pairs, 3).any(axis=1)
+    sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar & ~moving]
+    if (counted := planar | moving).any():
+        count_kinds(world, pairs[counted], counts)
     rows, unsupported = [ContactRows.silent(_NO_PAIRS)], [Unsupported.none()]
     if len(sliding):
-        rows.append(_sliding_polygons(world, sliding, horizon, tier, counts))
+        rows.append(_sliding(world, sliding, polygon_contacts, horizon, tier, counts))
+    if moving.any():
+        rows.append(_sliding(world, pairs[moving], solid_contacts, horizon, tier, counts))
     if len(spinning):
         answered, missing = _spinning_polygons(world, spinning, tier, counts)
         rows.append(answered)
@@ -301,17 +309,20 @@ def first_contact_rows(
     return ContactRows.joined(rows), Unsupported.joined(unsupported)
 
 
-def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]) -> ContactRows:
-    """Polygons in translation."""
+_Kernel = Callable[[World, IntArray, FloatArray, float, str, Counter[str]], ContactRows]
+
+
+def _sliding(
+    world: World, pairs: IntArray, kernel: _Kernel, horizon: float, tier: str, counts: Counter[str]
+) -> ContactRows:
+    """Bodies in translation: what the engine answers, and what their uncertainty makes of it."""
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     # A velocity that is off displaces by no more than this until the end of the time looked at.
     drift = world.velocity_uncertainty[pairs].sum(axis=1)
     uncertainty += np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)
     # What follows relies on normals as good as SPEED_ROUNDING says.
     vague = uncertainty.any()
-    rows = polygon_contacts(
-        world, pairs, world.twists[:, :2], horizon, "float64" if vague and tier == "float32" else tier, counts
-    )
+    rows = kernel(world, pairs, world.twists, horizon, "float64" if vague and tier == "float32" else tier, counts)
     if not vague:
         return rows.take(rows.status != ContactStatus.NEVER)
     never = rows.status == ContactStatus.NEVER
@@ -322,8 +333,12 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
         start = _approach(world, pairs[hits], uncertainty[hits], horizon, tier, counts)
         rows.lower[hits], rows.upper[hits] = np.fmin(rows.lower[hits], start), np.inf
     else:
-        speed, normal = _relative_velocity(world, pairs[hits]), rows.normal[hits, :2]
-        rows.lower[hits] = _earlier(rows.lower[hits], uncertainty[hits], speed, normal)
+        if _planar(world, pairs):
+            speed, normal = _relative_velocity(world, pairs[hits], 2), rows.normal[hits, :2]
+            rows.lower[hits] = _earlier(rows.lower[hits], uncertainty[hits], speed, normal)
+        else:  # a normal in space, of three vertices that may be close together, is less sharp than a distance
+            start = _approach(world, pairs[hits], uncertainty[hits], horizon, tier, counts)
+            rows.lower[hits] = np.fmin(rows.lower[hits], start)
         rows.upper[hits] = _later(world, rows.take(hits), uncertainty[hits], horizon)
     close = np.flatnonzero(never & (uncertainty > 0.0))
     start = _approach(world, pairs[close], uncertainty[close], horizon, tier, counts)
@@ -331,12 +346,17 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
     return rows.take(~never | ~np.isnan(rows.lower))
 
 
+def _planar(world: World, pairs: IntArray) -> bool:
+    """Whether pairs of one family are polygons."""
+    return bool(len(pairs)) and bool(world.planar[pairs[0, 0]])
+
+
 def polygon_contacts(
     world: World, pairs: IntArray, velocities: FloatArray, horizon: float, tier: str, counts: Counter[str]
 ) -> ContactRows:
     """The engine's answer for polygons with the given velocities."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
-    velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k]]) for k in range(2))
+    velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k], :2]) for k in range(2))
     status, time, lower, upper, last, normal, points, offsets, *_, rungs = _core.first_contact_polygons(
         *rings, velocity_a, velocity_b, horizon, True, tier
     )
@@ -348,9 +368,76 @@ def polygon_contacts(
     return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets)
 
 
-def _relative_velocity(world: World, pairs: IntArray) -> FloatArray:
-    """(k, 2): velocity of a as seen from b."""
-    velocity: FloatArray = world.twists[pairs[:, 0], :2] - world.twists[pairs[:, 1], :2]
+def followed_solids(world: World) -> BoolArray:
+    """(n,) bool: boxes, and hulls whose vertices are given, which first contact in translation has a kernel for."""
+    kinds, (box, hull) = world.kinds, map(_core.shape_kinds().index, ("box", "convex"))
+    # A frustum is a hull too, but of rounded corners.
+    given = world.table.packed.params[world.shape, 0] == 0.0
+    followed: BoolArray = (kinds == box) | ((kinds == hull) & given)
+    return followed
+
+
+def solid_contacts(
+    world: World, pairs: IntArray, velocities: FloatArray, horizon: float, tier: str, counts: Counter[str]
+) -> ContactRows:
+    """The engine's answer for boxes and hulls with the given velocities; there is no kernel in single precision."""
+    tier = tier if tier in SOLID_MOTION_TIERS else "float64"
+    count = len(pairs)
+    status, normal, points = np.zeros(count, np.uint8), np.zeros((count, 3)), np.empty(count, dtype=object)
+    time, lower, upper, last = (np.zeros(count) for _ in range(4))
+    for part, side_a, side_b in _by_kind(world, pairs):
+        velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[part, k], :3]) for k in range(2))
+        found = _core.first_contact_world(side_a, side_b, velocity_a, velocity_b, horizon, True, tier)
+        count_rungs(tier, found[-1], counts)
+        status[part], normal[part], sets, offsets = found[0], found[5], found[6], found[7]
+        time[part], lower[part], upper[part], last[part] = found[1:5]
+        for k, row in enumerate(np.flatnonzero(part).tolist()):
+            if offsets[k] < offsets[k + 1]:
+                points[row] = sets[offsets[k] : offsets[k + 1]]
+    return ContactRows(pairs, status, time, lower, upper, last, normal, points)
+
+
+_Side = tuple[Any, ...]
+
+
+def _by_kind(
+    world: World, pairs: IntArray, shift: FloatArray | None = None
+) -> Iterator[tuple[BoolArray, _Side, _Side]]:
+    """Pairs of boxes, of boxes and hulls, and so on: which they are, and both sides; the first may be shifted."""
+    boxes = world.table.boxes[world.shape[pairs]]
+    for is_box in product((True, False), repeat=2):
+        part = (boxes == is_box).all(axis=1)
+        if part.any():
+            rows = pairs[part]
+            moved = None if shift is None else shift[part]
+            yield part, _side(world, rows[:, 0], is_box[0], moved), _side(world, rows[:, 1], is_box[1], None)
+
+
+def _side(world: World, rows: IntArray, boxes: bool, shift: FloatArray | None) -> _Side:
+    """A batch of boxes, literally, or of hulls, as the engine reads it."""
+    if boxes:
+        center = world.poses[rows, :3]
+        center = np.ascontiguousarray(center if shift is None else center + shift)
+        axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
+        return center, axes, world.table.half[world.shape[rows]]
+    vertices, offsets = placed_hulls(world, rows)
+    return (vertices if shift is None else vertices + np.repeat(shift, np.diff(offsets), axis=0)), offsets
+
+
+def placed_hulls(world: World, rows: IntArray) -> tuple[FloatArray, IntArray]:
+    """Vertices (k, 3) and offsets of hulls in the fixed frame: these numbers, rounded, are taken literally."""
+    packed = world.table.packed
+    vertices, offsets = gather(packed.vertices, packed.offsets, world.shape[rows])
+    owner = np.repeat(rows, np.diff(offsets))
+    turn, (x, y, z) = world.rotations[owner], vertices.T
+    # Not a matrix product: that may add up in another order for another number of vertices.
+    turned = [turn[:, k, 0] * x + turn[:, k, 1] * y + turn[:, k, 2] * z for k in range(3)]
+    return np.column_stack(turned) + world.poses[owner, :3], offsets
+
+
+def _relative_velocity(world: World, pairs: IntArray, dimension: int) -> FloatArray:
+    """(k, d): velocity of a as seen from b."""
+    velocity: FloatArray = world.twists[pairs[:, 0], :dimension] - world.twists[pairs[:, 1], :dimension]
     return velocity
 
 
@@ -363,7 +450,7 @@ def _closing_speed(velocity: FloatArray, normal: FloatArray, sign: float) -> Flo
 
 def _speed(velocity: FloatArray) -> FloatArray:
     """Length of velocities, rounded up."""
-    speed: FloatArray = np.hypot(velocity[:, 0], velocity[:, 1]) * (1.0 + SPEED_ROUNDING)
+    speed: FloatArray = np.linalg.norm(velocity, axis=1) * (1.0 + SPEED_ROUNDING)
     return speed
 
 
@@ -404,20 +491,37 @@ def _later(world: World, rows: ContactRows, by: FloatArray, horizon: float) -> F
 def _distance_at(
     world: World, pairs: IntArray, time: FloatArray, signed: bool, tier: str = "float64"
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Distance of translating polygons at the given times: value, lower, upper, normal (k, 2)."""
+    """Distance of translating bodies at the given times: value, lower, upper, normal (k, d)."""
+    if not _planar(world, pairs):
+        return _solid_distance_at(world, pairs, time, signed, tier)
     ring_a, offsets_a = gather(*world.rings, pairs[:, 0])
     ring_b, offsets_b = gather(*world.rings, pairs[:, 1])
-    moved = ring_a + np.repeat(_relative_velocity(world, pairs) * time[:, None], np.diff(offsets_a), axis=0)
+    moved = ring_a + np.repeat(_relative_velocity(world, pairs, 2) * time[:, None], np.diff(offsets_a), axis=0)
     answer = _core.distance_polygons(moved, offsets_a, ring_b, offsets_b, signed, tier)
     size = np.maximum.reduceat(np.maximum(np.abs(ring_a), np.abs(moved)).max(axis=1), offsets_a[:-1])
     lower, upper = _widened(answer[1], answer[2], SHIFT_ROUNDING * size, signed)
     return answer[0], lower, upper, answer[5]
 
 
+def _solid_distance_at(
+    world: World, pairs: IntArray, time: FloatArray, signed: bool, tier: str
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    shift = _relative_velocity(world, pairs, 3) * time[:, None]
+    value, lower, upper, normal = (np.zeros((len(pairs), *size)) for size in ((), (), (), (3,)))
+    for part, side_a, side_b in _by_kind(world, pairs, shift):
+        answer = _core.distance_world(side_a, side_b, signed, tier)
+        value[part], lower[part], upper[part], normal[part] = answer[0], answer[1], answer[2], answer[5]
+    place = world.poses[pairs[:, 0], :3]
+    size = np.maximum(np.abs(place), np.abs(place + shift)).max(axis=1, initial=0.0)
+    size += world.table.reach[world.shape[pairs[:, 0]]]
+    lower, upper = _widened(lower, upper, SHIFT_ROUNDING * size, signed)
+    return value, lower, upper, normal
+
+
 def _approach(
     world: World, pairs: IntArray, by: FloatArray, horizon: float, tier: str, counts: Counter[str]
 ) -> FloatArray:
-    """(k,) time until which polygons in translation are surely more than `by` apart; NaN if to the end.
+    """(k,) time until which bodies in translation are surely more than `by` apart; NaN if to the end.
 
     Conservative advancement: the line through b's nearest point, perpendicular to the shortest way, is
     reached no sooner than gap / closing speed from now.  Bounding volumes name no line: there all speed counts.
@@ -432,8 +536,8 @@ def _approach(
         here = pairs[open_rows]
         _, lower, _, normal = _distance_at(world, here, time[open_rows], False, "bound" if volumes else "float64")
         gap = lower - by[open_rows]
-        speed = _relative_velocity(world, here)
-        closing = _speed(speed) if volumes else _closing_speed(speed, normal, 1.0)
+        velocity = _relative_velocity(world, here, normal.shape[1])
+        closing = _speed(velocity) if volumes else _closing_speed(velocity, normal, 1.0)
         step = np.divide(gap, closing, out=np.full_like(gap, np.inf), where=closing > 0.0)
         reached = gap <= 0.0
         time[open_rows] += np.where(reached, 0.0, step * (1.0 - TIME_ROUNDING))
@@ -468,7 +572,7 @@ def _unpredictable(world: World, pairs: Unsupported) -> Unsupported:
 def _solid_contacts(
     world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
-    """Solids: in contact now, at rest relative to each other and so never, or unsupported."""
+    """Solids that are not followed: in contact now, at rest relative to each other and so never, or unsupported."""
     rows, missing = distance_rows(world, pairs, True, tier, counts)
     motion = world.twists[rows.pairs]
     resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[rows.pairs].any(axis=1)
@@ -502,6 +606,10 @@ def _solid_contacts(
         points,
     )
     moving = status == ContactStatus.UNSUPPORTED
-    unmoved = _unpredictable(world, Unsupported.of_kinds(world, rows.pairs[moving], NO_MOTION))
-    unsupported = Unsupported.joined([missing, unmoved])
+    turning = moving & world.turns[rows.pairs].any(axis=1)
+    parts = [
+        Unsupported.of_kinds(world, rows.pairs[part], text)
+        for part, text in ((moving & ~turning, NO_MOTION), (turning, NO_TURNING))
+    ]
+    unsupported = Unsupported.joined([missing, _unpredictable(world, Unsupported.joined(parts))])
     return ContactRows.joined([answered.take(known | moving), ContactRows.silent(missing.pairs)]), unsupported

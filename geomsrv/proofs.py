@@ -15,9 +15,9 @@ import numpy as np
 from geomsrv import _validate
 from geomsrv.answers import Cull, Distances, FirstContacts, IntArray, json_line
 from geomsrv.certificates import without_claim
-from geomsrv.narrow_phase import relative_poses
+from geomsrv.narrow_phase import followed_solids, placed_hulls, relative_poses
 from geomsrv.queries import cull, distance, first_contact
-from geomsrv.shapes import Boxes, Frustum, Polygons
+from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
 from geomsrv.world import AnyShape, World, gather
 
 __all__ = ["contact_certificates", "cull_certificates", "distance_certificates"]
@@ -49,15 +49,17 @@ def distance_certificates(world: World, pairs: IntArray, *, want: Sequence[str],
 
 
 def contact_certificates(world: World, pairs: IntArray, horizon: float, *, accuracy: str) -> Iterator[str]:
-    """A line of JSON for each pair; what is not two polygons in translation, exactly known, claims nothing."""
+    """A line of JSON for each pair; what is not in translation, exactly known, and has a kernel, claims nothing."""
     _validate.certificates(True, accuracy)
-    vague = ~world.planar | (world.uncertainty > 0.0) | (world.velocity_uncertainty > 0.0)
+    vague = ~(world.planar | followed_solids(world))
+    vague |= (world.uncertainty > 0.0) | (world.velocity_uncertainty > 0.0)
     vague |= world.turns & (horizon > 0.0)
     for i, j in pairs.tolist():
-        if vague[i] or vague[j]:
+        if vague[i] or vague[j] or world.planar[i] != world.planar[j]:
             yield json_line(without_claim("first_contact", _shape(world, i), _shape(world, j)))
         else:
-            sides = (_ring(world, i), _ring(world, j), world.twists[i, :2], world.twists[j, :2])
+            body, d = (_ring, 2) if world.planar[i] else (_solid, 3)
+            sides = (body(world, i), body(world, j), world.twists[i, :d], world.twists[j, :d])
             answer = first_contact(*sides, t_max=horizon, accuracy=accuracy, contact_set=False, certificates=True)
             yield from _lines(answer)
 
@@ -73,3 +75,12 @@ def _shape(world: World, row: int) -> AnyShape:
 
 def _ring(world: World, row: int) -> Polygons:
     return Polygons(*gather(*world.rings, np.array([row])))
+
+
+def _solid(world: World, row: int) -> Boxes | Polytopes:
+    """A box or a hull, as first contact sees it."""
+    rows = np.array([row])
+    if not world.table.boxes[world.shape[row]]:
+        return Polytopes(*placed_hulls(world, rows))
+    half = world.table.half[world.shape[rows]]
+    return Boxes(world.poses[rows, :3], world.rotations[rows].swapaxes(1, 2), half)

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from geomsrv import _core, _validate
 from geomsrv.answers import (
     Booleans,
-    ContactStatus,
     Cost,
     Cull,
     Distances,
@@ -53,6 +52,7 @@ CULL_COUNTS = {
 }
 # What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
+SOLID_MOTION_TIERS = ("bound", "float64", "exact")  #: of first contact in space
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 
 
@@ -218,7 +218,7 @@ def first_contact(
 
     Parameters
     ----------
-    a, b : Polygons (2D) or Polytopes (3D); Boxes, too, if anything turns
+    a, b : Polygons (2D), Polytopes or Boxes (3D)
         n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another;
         only without a contact set, and piece by piece, so at the cost of all pairs of pieces.
     velocity_a, velocity_b : (n, d) or (d,) float
@@ -226,11 +226,13 @@ def first_contact(
     t_max : float
         End of the time window [s], >= 0; may be inf.
     accuracy : str
-        Tier; see the numerics page.  For polygons "exact" takes the numbers literally: no slack, everything correctly
-        rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound" looks at boxes and
-        circles only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can first meet (TOUCHING if
-        at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.  "float32" takes them
-        literally, too: NEVER and OVERLAPPING are certain; TOUCHING is all that it cannot tell from touching.
+        Tier; see the numerics page.  "float64" takes bodies that come within the rounding of coordinates for touching;
+        where exact arithmetic says otherwise, ``certain`` is False.  "exact" takes the numbers literally: no slack,
+        everything correctly rounded, every ``status`` certain; a time beyond the doubles is inf, not NEVER.  "bound"
+        looks at boxes, circles and spheres only: NEVER is certain; otherwise ``time`` = ``time_lower`` is when they can
+        first meet (TOUCHING if at once), ``time_upper`` = ``last_time`` when they can last, without normal or points.
+        "float32", of polygons, takes them literally, too: NEVER and OVERLAPPING are certain; TOUCHING is all that it
+        cannot tell from touching.
     contact_set : bool
         Whether to find the contact points; without them ``points`` is empty.
     certificates : bool
@@ -248,13 +250,15 @@ def first_contact(
     Returns
     -------
     FirstContacts
-        Polytopes answer UNSUPPORTED in this version unless something turns.  Then ``time`` is ``time_lower``: the
-        bodies are proven apart before it, and proven in contact at some time until ``time_upper``.  ``normal``, and one
-        contact point midway between the nearest points, are those at ``time``; ``last_time`` is NaN.  TOUCHING, at the
-        start, and GRAZING are outcomes where neither can be proven, with ``time_upper`` inf; NOT_CONVERGED is one
-        where the work allowed did not get beyond ``time_lower``, as for two bodies that turn beside each other for
-        ever.  ``cost.counts``: pairs decided in double ("filter") and double-double ("wide") arithmetic, and how often
-        a pair was looked at.
+        ``cost.counts``: polygons by the tier's rungs; solids decided by the "filter" in float64, in "wide" arithmetic
+        (double-double) and in "exact" arithmetic, which "float64", too, turns to where bodies pass within the slack.
+
+        If anything turns, ``time`` is ``time_lower``: the bodies are proven apart before it, and proven in contact at
+        some time until ``time_upper``.  ``normal``, ``closing_speed``, and one contact point midway between the nearest
+        points, are those at ``time``; ``last_time`` is NaN.  TOUCHING, at the start, and GRAZING are outcomes where
+        neither can be proven, with a ``time_upper`` that may be inf; NOT_CONVERGED is one where the work allowed did
+        not get beyond ``time_lower``, as for two bodies that turn beside each other for ever.  ``cost.counts``: pairs
+        decided in "filter" and "wide" arithmetic, and how many "looks" at them it took.
 
     Raises
     ------
@@ -263,8 +267,9 @@ def first_contact(
 
     References
     ----------
-    Book section 7.7 for the times; the contact set is derived from support features, because the printed labels fail
-    on rotated shapes.  Bodies that turn: conservative advancement (Mirtich, 1996), along a direction that turns, too.
+    Book sections 7.7 and 11.11 for the times; the contact set is derived from support features, because the printed
+    labels fail on rotated shapes.  Bodies that turn: conservative advancement (Mirtich, 1996), along a direction that
+    turns, too.
 
     Examples
     --------
@@ -279,6 +284,14 @@ def first_contact(
     >>> swing = gs.first_contact(rod, wall, (0, 0), (0, 0), angular_velocity_a=1.0)
     >>> float(swing.time[0].round(6)), swing.points.round(6).tolist()
     (0.523599, [[0.866025, 0.5]])
+
+    In space boxes and hulls may be mixed:
+
+    >>> cube = gs.Boxes.from_poses([[0, 0, 0, 0, 0, 0, 1]], [[1, 1, 1]])
+    >>> point = gs.Polytopes.from_list([[(5, 0.5, 0)]])
+    >>> hit = gs.first_contact(cube, point, (1, 0, 0), (-1, 0, 0), accuracy="exact")
+    >>> hit.time, hit.normal.tolist(), hit.closing_speed, hit.points.tolist()
+    (array([2.]), [[1.0, 0.0, 0.0]], array([2.]), [[3.0, 0.5, 0.0]])
     """
     start = time.perf_counter_ns()
     if isinstance(a, Region) or isinstance(b, Region):
@@ -306,39 +319,33 @@ def first_contact(
             contact_set=contact_set,
             certificates=certificates,
         )
-    _expect(a, (Polygons, Polytopes), "a")
-    _expect(b, type(a), "b")
-    assert not isinstance(a, Boxes) and not isinstance(b, Boxes)
+    _expect(a, (Polygons, Polytopes, Boxes), "a")
+    _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
     count = _common_length(len(a), len(b))
-    d = a.dimension
+    d = 2 if isinstance(a, Polygons) else 3
     moving_a, moving_b = (
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
     )
     end = _validate.limit(t_max, "t_max")
-    tier = _validate.accuracy(accuracy, TIERS if isinstance(a, Polygons) else ("float64",))
+    tier = _validate.accuracy(accuracy, TIERS if d == 2 else SOLID_MOTION_TIERS)
     certified = _validate.certificates(certificates, tier)
     proof = certify_contacts(a, b, (moving_a, moving_b), end) if certified else None
-    if isinstance(a, Polytopes):
-        nothing = np.full(count, np.nan)
-        return FirstContacts(
-            np.full(count, ContactStatus.UNSUPPORTED, np.uint8),
-            nothing,
-            nothing.copy(),
-            nothing.copy(),
-            nothing.copy(),
-            np.full((count, d), np.nan),
-            np.zeros((0, d)),
-            np.zeros(count + 1, np.int64),
-            np.zeros(count, np.bool_),
-            Cost(time.perf_counter_ns() - start, tier, {"unsupported": count}),
-            "first contact of polytopes is unsupported in this version",
-            _record=proof,
+    if isinstance(a, Polygons) and isinstance(b, Polygons):
+        answer = _core.first_contact_polygons(
+            a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
         )
-    answer = _core.first_contact_polygons(
-        a.vertices, a.offsets, b.vertices, b.offsets, moving_a, moving_b, end, bool(contact_set), tier
-    )
-    cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
-    return FirstContacts(*answer[:-1], cost, _record=proof)
+
+        def speed() -> FloatArray:
+            with np.errstate(over="ignore", invalid="ignore"):  # velocities may differ by more than the largest double
+                return -((moving_b - moving_a) * answer[5]).sum(axis=1)
+
+        cost = Cost(time.perf_counter_ns() - start, tier, _stages(tier, answer[-1]))
+        return FirstContacts(*answer[:-1], speed, cost, _record=proof)
+    side_a, side_b = (_side(cast(Boxes | Polytopes, body)) for body in (a, b))
+    found = _core.first_contact_world(side_a, side_b, moving_a, moving_b, end, bool(contact_set), tier)
+    # Of solids float64 decides some items by exact arithmetic, too: there the slack has the last word.
+    stages = _stages("exact" if tier == "float64" else tier, found[-1])
+    return FirstContacts(*found[:-1], Cost(time.perf_counter_ns() - start, tier, stages), _record=proof)
 
 
 def distance(

@@ -140,6 +140,7 @@ def first_contact_regions(
         points=np.zeros((0, 2)),
         point_offsets=np.zeros(count + 1, np.int64),
         certain=sure,
+        _closing_speed=lambda: np.array([answer.closing_speed for answer in found])[first, every],
         cost=_cost(found, start),
     )
 

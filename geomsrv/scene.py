@@ -534,10 +534,11 @@ class Scene:
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
-        Polygons in pure translation are followed, and polygons, boxes, hulls, spheres and capsules where one of a pair
-        turns, about the origin of its pose; pairs at rest relative to each other touch now or never; any pair that is
-        in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier "bound" a row means that the
-        pair may touch, TOUCHING that it may already; objects that turn are followed at "float64" only.
+        Polygons, boxes and hulls in pure translation are followed, and polygons, boxes, hulls, spheres and capsules
+        where one of a pair turns, about the origin of its pose; pairs at rest relative to each other touch now or
+        never; any pair that is in contact now answers time 0.  Other motions answer UNSUPPORTED by name.  At tier
+        "bound" a row means that the pair may touch, TOUCHING that it may already; objects that turn are followed at
+        "float64" only.
 
         Parameters
         ----------

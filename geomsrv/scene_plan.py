@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomsrv.narrow_phase import followed_solids
 from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.visibility import boxed_kinds
 from geomsrv.world import World, supported_kinds
@@ -45,21 +46,32 @@ def _first_contacts(world: World) -> list[str]:
     if not moving.any():
         return ["first contacts: nothing moves, nothing is swept; pairs are in contact now or never"]
     lines = [f"first contacts: boxes swept for {_count(int(moving.sum()), 'moving object')}"]
-    followed = int((moving & ~world.turns)[polygons].sum())
+    sliding, known = moving & ~world.turns, followed_solids(world)
+    followed = [
+        _count(int(number), name, plural)
+        for number, name, plural in (
+            (sliding[polygons].sum(), "polygon", ""),
+            ((sliding & known)[solids].sum(), "box or hull", "boxes and hulls"),
+        )
+        if number
+    ]
     if followed:
-        lines.append(f"- followed in translation: {_count(followed, 'polygon')}")
-    known = followed_in_turning(world)
-    if turning := int((world.turns & known).sum()):
-        lines.append(f"- followed while they turn: {_count(turning, 'object')}")
+        lines.append(f"- followed in translation: {', '.join(followed)}")
+    spinning = followed_in_turning(world)
+    if turning := int((world.turns & spinning).sum()):
+        lines.append(f"- followed while they turn, at tier float64: {_count(turning, 'object')}")
     elif not world.turns.any():
         lines.append("- rotation: skipped, nothing turns")
-    if lost := int((world.turns & ~known)[polygons].sum()):
+    if lost := int((world.turns & ~spinning)[polygons].sum()):
         lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
-    if strange := int((moving & ~(world.turns & known))[solids].sum()):
+    strange = int((moving & ~(known & sliding) & ~(spinning & world.turns))[solids].sum())
+    if strange:
         lines.append(
             f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "
             "against whatever moves differently"
         )
+    if (sliding & known)[solids].any() and not known[solids].all():
+        lines.append("- unsupported unless in contact now: boxes and hulls that move, against solids of other kinds")
     return lines
 
 

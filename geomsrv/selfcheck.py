@@ -7,6 +7,7 @@ Takes a few milliseconds, so that a robot can ask before it moves.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -239,13 +240,17 @@ def _unsupported() -> str:
 
 
 def _turning() -> str:
-    """A polygon that turns is not treated as one that translates."""
+    """A polygon that turns is followed: its corner, sqrt(2) from its middle, comes to a wall 1.2 away."""
     square = Polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     scene = Scene()
     spin = SceneObject("a", square, twist=(0, 0, 0, 0, 0, 1))
     scene.apply(SceneUpdate(add=[spin, SceneObject("b", square, (2.2, 0, 0, 0, 0, 0, 1))]))
-    status = scene.first_contacts(1.0).status.tolist()
-    return "" if status == [ContactStatus.UNSUPPORTED] else f"status {status}"
+    found = scene.first_contacts(1.0)
+    expected = math.pi / 4 - math.acos(1.2 / math.sqrt(2.0))
+    right = found.status.tolist() == [ContactStatus.WILL_TOUCH] and (
+        found.time_lower[0] <= expected * (1 + 1e-12) and expected * (1 - 1e-12) <= found.time_upper[0]
+    )
+    return "" if right else f"status {found.status.tolist()} at {found.time.tolist()}"
 
 
 _SCENES: dict[str, Callable[[], str]] = {

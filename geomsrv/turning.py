@@ -97,8 +97,24 @@ def first_contact_turning(
         points=np.ascontiguousarray(point[found, :d]),
         point_offsets=np.concatenate([[0], np.cumsum(found, dtype=np.int64)]),
         certain=certain,
+        _closing_speed=_closing_speed(lower, normal, point, motion_a, motion_b),
         cost=Cost(time.perf_counter_ns() - start, tier, counts),
     )
+
+
+def _closing_speed(
+    moment: FloatArray, normal: FloatArray, point: FloatArray, motion_a: FloatArray, motion_b: FloatArray
+) -> FloatArray:
+    """(n,) speed at which the bodies approach at their contact point; NaN without one."""
+
+    def velocity(motion: FloatArray) -> FloatArray:
+        linear, angular, center = motion[:, :3], motion[:, 3:6], motion[:, 6:]
+        return linear + np.cross(angular, point - (center + moment[:, None] * linear))
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        x, y, z = ((velocity(motion_a) - velocity(motion_b)) * normal).T
+        speed: FloatArray = x + y + z  # in this order everywhere
+    return speed
 
 
 def _packed(body: Bodies) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
-from geomsrv.narrow_phase import ContactRows, Unsupported, count_kinds, first_contact_rows
+from geomsrv.narrow_phase import ContactRows, Unsupported, count_kinds, first_contact_rows, placed_hulls
 from geomsrv.world import ROUNDOFF, World, gather
 
 __all__ = ["contact_rows", "followed_in_turning"]
@@ -102,21 +102,18 @@ def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatA
     if boxes:
         axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
         return np.ascontiguousarray(world.poses[rows, :3]), axes, world.table.half[world.shape[rows]]
-    packed = world.table.packed
-    names = _core.shape_kinds()
+    kinds = world.kinds[rows]
+    hull, capsule = map(_core.shape_kinds().index, ("convex", "capsule"))
+    if (kinds == hull).all():
+        return placed_hulls(world, rows)
+    half = np.where(kinds == capsule, world.table.packed.params[world.shape[rows], 1], 0.0)
     items = []
-    for row in rows.tolist():
-        shape = int(world.shape[row])
-        place, kind = world.poses[row, :3], names[packed.kinds[shape]]
-        if kind == "convex":
-            x, y, z = packed.vertices[packed.offsets[shape] : packed.offsets[shape + 1]].T
-            turn = world.rotations[row]
-            # Not a matrix product: that may add up in another order for another number of vertices.
-            items.append(np.column_stack([turn[k, 0] * x + turn[k, 1] * y + turn[k, 2] * z for k in range(3)]) + place)
+    for row, along in zip(rows.tolist(), half.tolist(), strict=True):
+        if world.kinds[row] == hull:
+            items.append(placed_hulls(world, np.array([row]))[0])
         else:
-            half = packed.params[shape, 1] if kind == "capsule" else 0.0
-            axis = world.rotations[row][:, 2]
-            items.append(np.array([place - half * axis, place + half * axis])[: 2 if half else 1])
+            place, axis = world.poses[row, :3], along * world.rotations[row][:, 2]
+            items.append(np.array([place - axis, place + axis])[: 2 if along else 1])
     return np.concatenate(items), np.cumsum([0, *map(len, items)], dtype=np.int64)
 
 

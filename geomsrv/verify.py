@@ -297,30 +297,35 @@ def relative_velocity(a: Fields, b: Fields, unit: int) -> list[int]:
     return sum_of(in_units(b["velocity"], unit), -1, in_units(a["velocity"], unit))
 
 
+def clip_of(pair: Pair, speed: Vector, n: Vector) -> tuple[int, Fraction | None]:
+    """The gap along a direction, and the time when it has closed; None if it stays."""
+    gap, closing = pair.gap(n), -dot(n, speed)
+    time = Fraction(gap * pair.unit, closing * pair.scale) if closing > 0 else None
+    return gap, time if gap > 0 else Fraction(0)
+
+
 def clips_of(pair: Pair, speed: Vector, evidence: Fields) -> list[tuple[int, Fraction | None]]:
     """Gaps along, across the velocity and across the facet, each with the time when it has closed; None if it stays."""
     along = [n for m in (speed, [speed[1], -speed[0]]) for n in (m, [-x for x in m]) if any(n)]
     if "facet" in evidence:
         along += normals_to(pair.differences(evidence["facet"]))
-    clips: list[tuple[int, Fraction | None]] = []
-    for n in along:
-        gap, closing = pair.gap(n), -dot(n, speed)
-        time = Fraction(gap * pair.unit, closing * pair.scale) if closing > 0 else None
-        clips.append((gap, time if gap > 0 else Fraction(0)))
-    return clips
+    return [clip_of(pair, speed, n) for n in along]
 
 
 def _first_contact(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fields) -> None:
-    """Polygons that move at constant velocity: NEVER, WILL_TOUCH at time, TOUCHING or OVERLAPPING at 0."""
+    """Bodies that move at constant velocity: NEVER, WILL_TOUCH at time, TOUCHING or OVERLAPPING at 0."""
     status, t_max, time = claim["status"], _float(claim["t_max"]), Fraction(0)
     speed = relative_velocity(a, b, pair.unit)
-    _require(len(speed) == 2 == len(pair.a[0]) and t_max >= 0.0, "not polygons, or t_max < 0")
-    if status == "OVERLAPPING":  # each difference lies less than half a turn further round the origin
-        around = pair.differences(evidence["around"])
-        turns = [p[0] * q[1] - p[1] * q[0] for p, q in zip(around, around[1:] + around[:1], strict=True)]
-        _require(bool(turns) and min(turns) > 0, "OVERLAPPING: the origin is not within the differences")
+    _require(len(speed) == len(pair.a[0]) and t_max >= 0.0, "velocities of another dimension, or t_max < 0")
+    if status == "OVERLAPPING":
+        room = _turns_around if len(speed) == 2 else _has_room
+        _require(room(pair, evidence), "OVERLAPPING: the origin is not within the differences")
     else:
-        clips = clips_of(pair, speed, evidence)
+        if len(speed) == 2:
+            clips = clips_of(pair, speed, evidence)
+        else:
+            _require(any(way := way_of(pair, speed, evidence)), f"{status}: there is no way between the bodies")
+            clips = [clip_of(pair, speed, way)]
         if status == "NEVER":
             apart = any(gap > 0 and (closed is None or closed > t_max) for gap, closed in clips)
             _require(apart, "NEVER: not apart until t_max")
@@ -335,3 +340,44 @@ def _first_contact(pair: Pair, a: Fields, b: Fields, claim: Fields, evidence: Fi
         _require(not any(nearest(simplex)[0]), f"{status}: no common point at that time")
     lower, value, upper = (_float(claim[name]) for name in ("time_lower", "time", "time_upper"))
     _require(lower <= value <= upper and lower <= time <= upper, "the time is not in [time_lower, time_upper]")
+
+
+def _turns_around(pair: Pair, evidence: Fields) -> bool:
+    """Whether each difference lies less than half a turn further round the origin than the one before."""
+    around = pair.differences(evidence["around"])
+    turns = [p[0] * q[1] - p[1] * q[0] for p, q in zip(around, around[1:] + around[:1], strict=True)]
+    return bool(turns) and min(turns) > 0
+
+
+ROOM = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))  #: corners around the origin, which is inside
+
+
+def _has_room(pair: Pair, evidence: Fields) -> bool:
+    """Whether the bodies still have common points after b is moved by so much towards each of four corners."""
+    size, simplices = _float(evidence["room"]), evidence["simplices"]
+    moved = [aside(pair, [size * x for x in corner]) for corner in ROOM]
+    meet = [not any(nearest(p.differences(s))[0]) for p, s in zip(moved, simplices, strict=True)]
+    return size > 0.0 and all(meet)
+
+
+def aside(pair: Pair, way: Sequence[Any]) -> Pair:
+    """Body b moved by floats."""
+    unit = unit_of(way)
+    return pair.moved(in_units(way, unit), Fraction(pair.unit, unit))
+
+
+def way_of(pair: Pair, speed: Vector, evidence: Fields) -> Vector:
+    """In space: the shortest way from a to b, of the listed simplex, where `evidence` places them."""
+    if "across" in evidence:  # as seen along the velocity
+        square, points = dot(speed, speed), pair.differences(evidence["across"])
+        return nearest([sum_of([square * x for x in p], -dot(p, speed), speed) for p in points])[0]
+    moved = aside(pair, evidence["aside"]) if "aside" in evidence else pair.moved(speed, time_of(evidence))
+    return nearest(moved.differences(evidence["apart"]))[0]
+
+
+def time_of(evidence: Fields) -> Fraction:
+    """The sum of floats, times a power of two where it is below them."""
+    exponent = evidence.get("exponent", 0)
+    _require(isinstance(exponent, int) and abs(exponent) < 10**4, "evidence: no such time")
+    power: Fraction = Fraction(2) ** exponent
+    return power * sum((Fraction(_float(part)) for part in evidence["at"]), Fraction(0))

@@ -11,8 +11,10 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
-from oracle import frustum_box, polygon, polytope
+from oracle import frustum_box, moving_polytope, polygon, polytope
 from oracle.vectors import Vector, add, compare_root, dot, exact, nearest_double, root_bracket, scale, sub
+
+from geomsrv.evidence import evidence_of_contact
 
 Record = dict[str, Any]
 
@@ -168,6 +170,19 @@ def contact_record(a: Record, b: Record, t_max: float) -> Record:
     return {"query": "first_contact", "a": a, "b": b, "claim": claim, "evidence": evidence}
 
 
+def space_contact_record(a: Record, b: Record, t_max: float) -> Record:
+    """The oracle's answer; what proves it in space are searches of the checker's own kind."""
+    found = true_contact(a, b, t_max)
+    claim: Record = {"status": found.status, "t_max": t_max}
+    near: Record = {}
+    if found.time is not None:
+        low, high = _below(found.time), _above(found.time)
+        claim |= {"time_lower": low, "time": low, "time_upper": high}
+        near["begin"] = low
+    evidence = evidence_of_contact(a, b, found.status, t_max, **near)
+    return {"query": "first_contact", "a": a, "b": b, "claim": claim, "evidence": evidence}
+
+
 def exact_or_inf(x: float) -> Any:
     return x if math.isinf(x) else Fraction(x)
 
@@ -184,7 +199,10 @@ def true_state(frustum: Record, box: Record) -> str:
 
 
 def true_contact(a: Record, b: Record, t_max: float) -> polygon.FirstContact:
-    return polygon.first_contact(a["vertices"], a["velocity"], b["vertices"], b["velocity"], t_max)
+    if len(a["velocity"]) == 2:
+        return polygon.first_contact(a["vertices"], a["velocity"], b["vertices"], b["velocity"], t_max)
+    sides = vertices(a), a["velocity"], vertices(b), b["velocity"]
+    return moving_polytope.first_contact(*sides, t_max, contact=False)
 
 
 def is_true(record: Record) -> bool:
@@ -228,7 +246,7 @@ def falsified(record: Record, *parts: str) -> Iterator[tuple[str, Record]]:
                 _parent(changed, path)[path[-1]] = other
                 yield f"{'.'.join(map(str, path))}: {value!r} -> {other!r}", changed
     for name, rows in record["evidence"].items() if "evidence" in parts else ():
-        for k, row in enumerate(rows if isinstance(rows[0], list) else ()):
+        for k, row in enumerate(rows if isinstance(rows, list) and rows and isinstance(rows[0], list) else ()):
             fewer, swapped = copy.deepcopy(record), copy.deepcopy(record)
             del fewer["evidence"][name][k]
             swapped["evidence"][name][k] = row[::-1]

@@ -144,6 +144,23 @@ def first_contact(s: Stream, tier: str, share: int) -> Answers:
     yield gs.first_contact(s.rings(count), s.rings(count), *velocities, t_max=32.0, accuracy=tier)
 
 
+def solid_motions(s: Stream, tier: str, share: int) -> Answers:
+    count = 2500 // share
+    for side_a, side_b in ((s.boxes, s.boxes), (s.boxes, s.hulls), (s.hulls, s.hulls)):
+        velocities = s.reals(-2, 2, 2, count, 3, bits=3)
+        yield gs.first_contact(side_a(count), side_b(count), *velocities, t_max=32.0, accuracy=tier)
+
+
+def turning(s: Stream, tier: str, share: int) -> Answers:
+    count = 1000 // share
+    for d, side_a, side_b in ((2, s.rings, s.rings), (3, s.boxes, s.boxes), (3, s.boxes, s.hulls)):
+        linear, (spin_a, spin_b) = s.reals(-2, 2, 2, count, d, bits=3), s.reals(-3, 3, 2, count, 2 * d - 3, bits=3)
+        spins = {"angular_velocity_a": spin_a.reshape(count, -1), "angular_velocity_b": spin_b.reshape(count, -1)}
+        if d == 2:
+            spins = {name: spin[:, 0] for name, spin in spins.items()}
+        yield gs.first_contact(side_a(count), side_b(count), *linear, t_max=8.0, accuracy=tier, **spins)
+
+
 def boxes(s: Stream, tier: str, share: int) -> Answers:
     a, b = s.boxes(10000 // share), s.boxes(10000 // share)
     yield gs.distance(a, b, accuracy=tier, want=("penetration",))
@@ -184,13 +201,25 @@ def shapes(s: Stream, tier: str, share: int) -> Answers:
 
 QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
     query.__name__: query
-    for query in (cull, to_frustum, to_frustum_2d, polygons, first_contact, boxes, hulls, mixed, shapes)
+    for query in (
+        cull,
+        to_frustum,
+        to_frustum_2d,
+        polygons,
+        first_contact,
+        solid_motions,
+        turning,
+        boxes,
+        hulls,
+        mixed,
+        shapes,
+    )
 }
 
 
 # -------------------------------------------------------------------------------------------------------- hashing
 
-LAZY = {"_point_a": "point_a", "_normal": "normal"}  #: found on first use
+LAZY = {"_point_a": "point_a", "_normal": "normal", "_closing_speed": "closing_speed"}  #: found on first use
 
 
 def content(answer: Any) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -68,8 +68,8 @@ ATTRIBUTES = {
     "Cull": "state certain cost certificates",
     "Distances": "distance lower upper point_a point_b normal status region cost certificates",
     "Booleans": "value certain status cost certificates",
-    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain cost "
-    "certificates",
+    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain closing_speed "
+    "cost certificates",
     "CollisionTimes": "status time time_lower time_upper certain first earliest earliest_upper cost",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",
@@ -262,10 +262,9 @@ def array_arguments(signature: str) -> list[np.ndarray]:
     return [np.zeros(shape, dtype) for (dtype, _), shape in zip(found, shapes, strict=True)]
 
 
-IN_TUPLES = ("distance_world", "distance_world_stages", "first_contact_turning")
-
-
-@pytest.mark.parametrize("name", [name for name in stub_functions() if name not in IN_TUPLES])
+@pytest.mark.parametrize(
+    "name", [name for name in stub_functions() if "_world" not in name and not name.endswith("_turning")]
+)
 def test_engine_refuses_what_it_would_have_to_copy(name: str) -> None:
     """Another dtype or layout means that the edge was bypassed: a TypeError, never a silent copy."""
     function = getattr(_core, name)
@@ -298,6 +297,25 @@ def test_engine_refuses_sides_that_it_would_have_to_copy(name: str) -> None:
     for side in ((), sides["boxes"] * 2):
         with pytest.raises(TypeError, match="distance: a side must be"):
             function(sides["boxes"], side, True)
+
+
+def test_engine_refuses_moving_sides_that_it_would_have_to_copy() -> None:
+    boxes = (np.zeros((2, 3)), np.zeros((2, 3, 3)), np.zeros((2, 3)))
+    polytopes = (np.zeros((2, 3)), np.array([0, 1, 2]))
+    rest = (np.zeros((1, 3)), np.zeros((1, 3)), 1.0, True)
+    for side in (boxes, polytopes):
+        _core.first_contact_world(side, boxes, *rest)
+        for i, array in enumerate(side):
+            for other in (array.astype(np.float32), np.repeat(array, 2, axis=0)[::2], array[..., None], None):
+                with pytest.raises(TypeError, match="first_contact: a side must be"):
+                    _core.first_contact_world((*side[:i], other, *side[i + 1 :]), boxes, *rest)
+    for side in ((), boxes * 2):
+        with pytest.raises(TypeError, match="first_contact: a side must be"):
+            _core.first_contact_world(boxes, side, *rest)
+    with pytest.raises(ValueError, match="first_contact: no such accuracy"):
+        _core.first_contact_world(boxes, boxes, *rest, "float32")
+    with pytest.raises(TypeError, match="incompatible function arguments"):
+        _core.first_contact_world(boxes, boxes, rest[0].astype(np.float32), *rest[1:])
 
 
 # --------------------------------------------------------------------------------------------- without ROS

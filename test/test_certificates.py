@@ -15,7 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from certificate_records import contact_record, cull_record, distance_record, falsified, is_true
+from certificate_records import (
+    contact_record,
+    cull_record,
+    distance_record,
+    falsified,
+    is_true,
+    space_contact_record,
+)
 from conftest import from_hex, hard_cases, reproducer
 from oracle.vectors import cross, dot
 from polygon_scenes import polygons, random_ring
@@ -149,13 +156,27 @@ def contact_scene(rng):
     return contact_record(a, b, float(rng.choice([0.0, 1.0, 4.0, math.inf])))
 
 
+def space_contact_scene(rng):
+    a, b = (hull(rng) if rng.random() < 0.7 else box(rng) for _ in range(2))
+    a["velocity"], b["velocity"] = lattice(rng, 3, size=2), lattice(rng, 3, size=2)
+    if b["kind"] == "hull":
+        where = np.array(b["vertices"]) + lattice(rng, 3, size=4)
+        if a["kind"] == "hull" and rng.random() < 0.4:  # vertex on vertex, now or later
+            later = rng.integers(0, 3) * (np.array(a["velocity"]) - b["velocity"])
+            where = where - where[0] + a["vertices"][0] + later
+        b["vertices"] = where.tolist()
+    return space_contact_record(a, b, float(rng.choice([0.0, 1.0, 4.0, math.inf])))
+
+
 SCENES = {
     "distance": distance_scene,
     "distance, plane": flat_distance_scene,
     "cull": cull_scene,
     "first contact": contact_scene,
+    "first contact, space": space_contact_scene,
 }
-KINDS = {"distance": 4, "distance, plane": 3, "cull": 3, "first contact": 4}  #: how many `kind_of` can tell apart
+#: how many `kind_of` can tell apart
+KINDS = {"distance": 4, "distance, plane": 3, "cull": 3, "first contact": 4, "first contact, space": 4}
 
 
 def kind_of(record):
@@ -258,7 +279,7 @@ def test_touching_is_meeting() -> None:
     assert not proves(record)
 
 
-@pytest.mark.parametrize("scene", ["cull", "first contact"])
+@pytest.mark.parametrize("scene", ["cull", "first contact", "first contact, space"])
 def test_radius_is_for_distances_only(scene, rng) -> None:
     record = SCENES[scene](rng)
     record["b"]["radius"] = 0.5
@@ -281,13 +302,13 @@ def test_nothing_is_proven_of_what_claims_nothing() -> None:
 
 
 @pytest.mark.parametrize("exponent", [-1000, -300, 300, 900])
-@pytest.mark.parametrize("scene", ["distance", "distance, plane", "first contact"])
+@pytest.mark.parametrize("scene", ["distance", "distance, plane", "first contact", "first contact, space"])
 def test_huge_and_tiny_numbers(scene, exponent, rng) -> None:
     """Scaled by a power of two, so the proof stays the same."""
 
     def scaled(value, name=""):
         if isinstance(value, dict):
-            keep = {"rotation", "axes", "time", "time_lower", "time_upper", "t_max"}
+            keep = {"rotation", "axes", "time", "time_lower", "time_upper", "t_max", "at"}
             return {key: item if key in keep else scaled(item) for key, item in value.items()}
         if isinstance(value, list):
             return [scaled(item) for item in value]
@@ -312,9 +333,9 @@ def test_command_proves_files(tmp_path, capsys, rng) -> None:
     good = write(tmp_path / "good.jsonl", records)
     capsys.readouterr()
     assert main(["verify", good]) == 0
-    assert capsys.readouterr().out == "12 records: 12 proven, 0 failed\n"
+    assert capsys.readouterr().out == "15 records: 15 proven, 0 failed\n"
     assert main(["verify", good, write(tmp_path / "more.jsonl", [empty])]) == 0
-    assert capsys.readouterr().out == "13 records: 12 proven, 1 claim nothing, 0 failed\n"
+    assert capsys.readouterr().out == "16 records: 15 proven, 1 claim nothing, 0 failed\n"
 
 
 def test_command_names_what_fails(tmp_path, capsys, rng) -> None:
@@ -385,6 +406,13 @@ def corpus_batches():
             case["id"],
             lambda t, a=a, b=b, g=given: gs.first_contact(a, b, g["velP"], g["velQ"], t_max=g["tmax"], **t),
         )
+    for case in hard_cases("polyhedra_moving"):
+        given = from_hex(case["input"])
+        a, b = (gs.Polytopes.from_list([given[k]["vertices"]]) for k in "PQ")
+        yield (
+            case["id"],
+            lambda t, a=a, b=b, g=given: gs.first_contact(a, b, g["velP"], g["velQ"], t_max=g["tmax"], **t),
+        )
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -421,6 +449,9 @@ def some_answers(tier):
         "to frustum": lambda t: gs.distance_to_frustum(view, [[0, 0, 0], [0, 0, 2], [9, 9, 9]], **t),
         "to frustum, plane": lambda t: gs.distance_to_frustum(flat_view, [[0, 0], [0, 2], [9, 9]], **t),
         "first contact": lambda t: gs.first_contact(rings, polygons([(5, 0), (6, 0), (6, 9)]), (1, 0), (0, 0.5), **t),
+        "first contact, space": lambda t: gs.first_contact(
+            hulls, gs.Boxes([[3, 0, 0]], [np.eye(3)], [[1, 1, 2]]), [[1, 0, 0], [1, 0.25, 0], [1, 0, 1]], (0, 0, 0), **t
+        ),
         "polygons": lambda t: gs.distance(polygons([(2, 0), (3, 3)]), rings, **t),
         "boxes": lambda t: gs.distance(boxes, boxes, **t),
         "boxes, hulls": lambda t: gs.distance(boxes, hulls, want=("penetration",), **t),
@@ -474,6 +505,8 @@ TAMPERED = [
     ("capsule-box", "lower", lambda x: x + 0.125),
     ("capsule-box", "distance", lambda x: x - 0.125),
     ("capsule-box meet", "value", lambda x: ~x),
+    ("first contact, space", "status", lambda x: (x + 1) % 4),
+    ("first contact, space", "time", lambda x: x + 0.125),
     ("first contact", "status", lambda x: (x + 1) % 4),
     ("first contact", "time", lambda x: x + 0.125),
 ]
@@ -481,7 +514,7 @@ TAMPERED = [
 
 @pytest.mark.parametrize(("name", "field", "change"), TAMPERED, ids=[f"{n}, {f}" for n, f, _ in TAMPERED])
 def test_changed_answer_is_noticed(name, field, change) -> None:
-    answer = dict(some_answers("exact" if name == "first contact" else "float64"))[name]
+    answer = dict(some_answers("exact" if name.startswith("first contact") else "float64"))[name]
     gs.verify(answer)
     with pytest.raises(CertificateError, match=r"^item \d: "):
         gs.verify(dataclasses.replace(answer, **{field: change(getattr(answer, field))}))
@@ -491,7 +524,9 @@ def test_changed_answer_is_noticed(name, field, change) -> None:
         gs.verify(answer)
 
 
-@pytest.mark.parametrize("name", ["boxes, hulls", "capsule-convex", "box-box", "cull", "to frustum, plane"])
+@pytest.mark.parametrize(
+    "name", ["boxes, hulls", "capsule-convex", "box-box", "cull", "to frustum, plane", "first contact, space"]
+)
 def test_change_in_a_record_is_rejected_or_still_true(name) -> None:
     rejected = 0
     for record in dict(some_answers("float64"))[name].certificates:

@@ -147,3 +147,39 @@ def test_first_contact(name: str) -> None:
     assert answer.status == (gs.WILL_TOUCH if expected > 0 else gs.OVERLAPPING)
     assert answer.time_lower[0] <= answer.time[0] <= answer.time_upper[0]
     assert abs(answer.time[0] - expected) <= VERIFIED * max(1.0, expected)
+
+
+SOLID_MOTIONS = {
+    case["id"]: case
+    for case in field_cases("toi")
+    if all(shape["type"] in ("box", "convex", "segment", "triangle") for shape in case["shapes"])
+}
+
+
+def solids_of(shape: dict[str, Any]) -> gs.Boxes | gs.Polytopes:
+    """A batch of one: a box as such, what has vertices as their hull."""
+    if isinstance(solid := shape_of(shape), gs.Box):
+        rotation, position = pose_of(shape)
+        return gs.Boxes([position], [rotation.T], [solid.half_extents])
+    corners = corners_of(shape)
+    assert corners is not None
+    return gs.Polytopes.from_list([corners])
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize("name", SOLID_MOTIONS)
+def test_first_contact_of_solids(name: str, tier: str) -> None:
+    case = SOLID_MOTIONS[name]
+    bodies = [solids_of(shape) for shape in case["shapes"]]
+    answer = gs.first_contact(*bodies, *case["motion"]["v"], t_max=float(case["motion"]["tmax"]), accuracy=tier)
+    expected = case["verified_value"]
+    if expected is None:
+        assert answer.status == gs.NEVER and answer.certain
+        return
+    assert answer.status == (gs.WILL_TOUCH if expected > 0 else gs.OVERLAPPING) and answer.certain
+    assert answer.time_lower[0] <= answer.time[0] <= answer.time_upper[0] and len(answer.points) > 0
+    assert abs(answer.time[0] - expected) <= VERIFIED * max(1.0, expected)
+
+
+def test_enough_motions_of_solids() -> None:
+    assert len(SOLID_MOTIONS) >= 8

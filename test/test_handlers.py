@@ -367,8 +367,9 @@ def test_first_contact_batch(desk) -> None:
         offsets_b=convert.uint32s([0, 1]),
         velocities_a=D([1, 0, 0]),
         velocities_b=D([0, 0, 0]),
+        t_max=10.0,
     )
-    assert solid.status == UNSUPPORTED and "polytopes" in solid.message and solid.item_status.tolist() == [4]
+    assert solid.status == OK and solid.item_status.tolist() == [1] and solid.time.tolist() == [3.0]
 
 
 # --------------------------------------------------------------------------------------------------- certificates
@@ -397,6 +398,13 @@ CERTIFIED = {
         [1],
     ),
     "first contact": ("FirstContact", {"ids_a": ["left", "box"], "ids_b": ["right", "ball"], "horizon": 5.0}, [1, 0]),
+    "first contact of solids": (
+        "FirstContact",
+        {"select": INLINE, "horizon": 9.0}
+        | {"shapes_a": shapes(gs.Box([1, 1, 1])), "poses_a": at((0, 0, 0)), "twists_a": D([1, 0, 0, 0, 0, 0])}
+        | {"shapes_b": shapes(gs.Convex(np.eye(3))), "poses_b": at((5, 0, 0))},
+        [1],
+    ),
     "cull by ids": ("Cull", {"ids": ["far", "box", "ball"]}, [0, 1, 0]),
     "cull all": ("Cull", {"select": ALL}, [0, 1, 0, 0, 0, 0]),
     "cull inline": ("Cull", {"select": INLINE, "shapes": shapes(gs.Box([1, 1, 1])), "poses": at((0, 0, 0))}, [1]),
@@ -415,6 +423,13 @@ CERTIFIED = {
         "FirstContactBatch",
         {"vertices_b": D([3, 0, 4, 0, 3, 1]), "offsets_b": convert.uint32s([0, 3]), **RINGS}
         | {"velocities_a": D([1, 0]), "velocities_b": D([0, 0]), "t_max": math.inf},
+        [1],
+    ),
+    "first contact batch of solids": (
+        "FirstContactBatch",
+        {"dimension": 3, "vertices_a": D(np.eye(3)), "offsets_a": convert.uint32s([0, 3])}
+        | {"vertices_b": D(np.eye(3) + 2), "offsets_b": convert.uint32s([0, 3])}
+        | {"velocities_a": D([1, 1, 1]), "velocities_b": D([0, 0, 0]), "t_max": math.inf},
         [1],
     ),
 }  # fmt: skip

@@ -65,7 +65,14 @@ def test_class(kind: str, group: str) -> None:
         check(case)
 
 
-KINDS = ("frustum_box", "point_frustum", "box_box_distance", "polygon2d_distance", "polygon2d_moving")
+KINDS = (
+    "frustum_box",
+    "point_frustum",
+    "box_box_distance",
+    "polygon2d_distance",
+    "polygon2d_moving",
+    "polyhedra_moving",
+)
 CORPUS = [case for case in read(DATA / "hard_cases.jsonl") if case.kind in KINDS]
 
 
@@ -96,7 +103,10 @@ def test_every_class_of_the_corpus_is_generated() -> None:
 ALIASES = {
     "needle": ("needle_polygons", "moving_needles"),
     "many_gon": ("many_gon", "moving_many_gon"),
+    "needle_slab": ("needle_slab", "moving_needles"),
     "grazing_slanted": ("grazing_parallel_edge",),
+    "grazing_face": ("grazing_edge",),
+    "near_parallel_ridge_pass": ("near_parallel_ridge",),
     "near_parallel": ("near_parallel", "near_parallel_closing"),
 }
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from conftest import hard_cases
-from oracle import frustum_box, point_frustum, polygon, polytope
+from oracle import frustum_box, moving_polytope, point_frustum, polygon, polytope
 from oracle.vectors import (
     add,
     compare_root,
@@ -97,6 +97,26 @@ def test_polygon_first_contact(case: dict[str, Any]) -> None:
     assert polygon.dimension(found.contact) == answer["contact_dim"]
     speed = answer["normal_speed_sq"]
     assert found.normal_speed_sq == (None if speed is None else Fraction(speed))
+
+
+@by_id("polyhedra_moving")
+def test_polytope_first_contact(case: dict[str, Any]) -> None:
+    given, answer = case["input"], case["answer"]
+    p, q = (given[key]["vertices"] for key in "PQ")
+    found = moving_polytope.first_contact(p, given["velP"], q, given["velQ"], given["tmax"])
+    assert found.hits == answer["hits"]
+    start = (found.separation_sq > 0) - (found.separation_sq < 0)
+    assert start == {"disjoint": 1, "touching": 0, "overlapping": -1}[answer["separation"]]
+    if not found.hits:
+        assert found.status == polygon.NEVER
+        return
+    assert found.time == Fraction(answer["time"])
+    assert found.last_time == Fraction(answer["last_time"])
+    assert found.contact == sorted(exact(answer["contact"]))
+    assert moving_polytope.dimension(found.contact) == answer["contact_dim"]
+    if answer["normal_speed_sq"] is not None and answer["contact_dim"] == 2:
+        # Of a smaller contact there are more normals than those of the difference's facets.
+        assert found.normal_speed_sq == Fraction(answer["normal_speed_sq"])
 
 
 def literal_frustum(given: dict[str, Any]) -> tuple[Any, ...]:

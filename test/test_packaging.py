@@ -82,3 +82,13 @@ def test_stub_names_what_the_module_has():
     stub = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
     module = {name for name in dir(_core) if not name.startswith("_")}
     assert stub == module
+
+
+@pytest.mark.parametrize("target", ["hard", "bench", "price", "demo"])
+def test_commands_of_the_makefile_run_on_the_installed_package(target):
+    """Started in the source root, whose package has no engine, they must not import it from there."""
+    if not (SOURCE / ".venv/bin/python").exists():
+        pytest.skip("not built by make")
+    command = f"make --no-print-directory --dry-run --assume-old build {target} ARGS=--help | tail -n 1 | sh"
+    ran = subprocess.run(command, shell=True, cwd=SOURCE, capture_output=True, text=True, timeout=60)
+    assert "usage:" in ran.stdout and not ran.stderr, ran.stderr

@@ -448,7 +448,7 @@ def test_rotation_is_never_treated_as_translation():
     assert answer.status[k] == ContactStatus.WILL_TOUCH and not answer.unsupported
     assert answer.time_lower[k] <= expected <= answer.time_upper[k] <= answer.time_lower[k] + 1e-6
     np.testing.assert_allclose(answer.points[answer.point_offsets[k]], [0.5, 1.0, 0.0], atol=1e-5)
-    assert np.isnan(answer.last_time[k]) and "followed while they turn: 1 object" in scene.plan()
+    assert np.isnan(answer.last_time[k]) and "followed while they turn, at tier float64: 1 object" in scene.plan()
     k = found["bar", "touched"]
     assert answer.status[k] == ContactStatus.OVERLAPPING and answer.time[k] == 0.0 == answer.time_upper[k]
     assert np.isnan(answer.last_time[k]), "nobody looks for the end"
@@ -573,6 +573,85 @@ def test_turning_objects_as_the_queries_see_them():
             else:
                 assert (answer.status[k], answer.time[k]) == (single.status[0], single.time[0])
                 assert answer.time_upper[k] == single.time_upper[0]
+
+
+def moving_solids(n, seed, span=3.0):
+    rng = np.random.default_rng(seed)
+
+    def shape(k):
+        return (
+            gs.Box(rng.uniform(0.1, 0.8, 3)) if k % 2 else gs.Convex(rng.normal(size=(int(rng.integers(1, 12)), 3)) / 3)
+        )
+
+    return [
+        gs.SceneObject(f"{k:03}", shape(k), random_pose(rng, span), (*rng.uniform(-1.0, 1.0, 3), 0.0, 0.0, 0.0))
+        for k in range(n)
+    ]
+
+
+def placed_solid(item):
+    pose = np.asarray(item.pose)
+    turn = gs._validate.rotation_matrices(pose[None, 3:])[0]
+    if isinstance(item.shape, gs.Box):
+        return gs.Boxes([pose[:3]], [turn.T], [item.shape.half_extents])
+    return gs.Polytopes.from_list([item.shape.vertices @ turn.T + pose[:3]])
+
+
+@pytest.mark.parametrize("horizon", [2.0, INF])
+def test_first_contacts_of_solids_are_those_of_every_pair_asked_by_itself(horizon):
+    objects = moving_solids(56, 5)
+    answer = scene_of(objects).first_contacts(horizon)
+    found = rows_of(answer)
+    reached = set()
+    for a, b in itertools.combinations(objects, 2):
+        velocities = (np.array(item.twist[:3]) for item in (a, b))
+        one = gs.first_contact(placed_solid(a), placed_solid(b), *velocities, t_max=horizon)
+        if one.status[0] == gs.NEVER:
+            assert (a.id, b.id) not in found
+            continue
+        k = found[a.id, b.id]
+        reached.add((a.shape.kind, b.shape.kind, int(one.status[0])))
+        assert answer.status[k] == one.status[0]
+        assert answer.time[k] == pytest.approx(one.time[0], abs=1e-9)
+        assert answer.time_lower[k] <= answer.time[k] <= answer.time_upper[k] <= answer.time_lower[k] + 1e-9
+        assert answer.last_time[k] == pytest.approx(one.last_time[0], rel=1e-9, abs=1e-9)
+        np.testing.assert_allclose(answer.normal[k], one.normal[0], atol=1e-9)
+        points = answer.points[answer.point_offsets[k] : answer.point_offsets[k + 1]]
+        assert len(points) == len(one.points) > 0
+        np.testing.assert_allclose(points, one.points, atol=1e-9)
+    assert len(answer) == len(found) and answer.unsupported == []
+    assert len(reached) == 8, "boxes and hulls, either first, touching later or overlapping now"
+
+
+def test_prisms_meet_when_their_bases_do():
+    """What a polygon is told about its motion holds for the solid on it, with and without uncertainty."""
+    rng = np.random.default_rng(3)
+    vague = dict(uncertainty=0.01, velocity_uncertainty=0.02)
+    for options in ({}, vague):
+        for _ in range(20):
+            half, place = rng.uniform(0.2, 1.0, (2, 2)), rng.uniform(-1.0, 1.0, 2) + (3.0, 0.0)
+            twist = (1.0, *rng.uniform(-0.2, 0.2, 1), 0.0, 0.0, 0.0, 0.0)
+            corners = [np.array([(-x, -y), (x, -y), (x, y), (-x, y)]) for x, y in half]
+            prisms = [np.array([(*p, z) for p in ring for z in (-1.0, 1.0)]) for ring in corners]
+            families = {
+                "polygon": [gs.Polygon(ring) for ring in corners],
+                "box": [gs.Box((x, y, 1.0)) for x, y in half],
+                "hull": [gs.Convex(prism) for prism in prisms],
+            }
+            answers = {
+                name: scene_of(
+                    [gs.SceneObject("a", a, IDENTITY, twist, **options), gs.SceneObject("b", b, at(*place, 0.0))]
+                ).first_contacts(6.0)
+                for name, (a, b) in families.items()
+            }
+            flat = answers.pop("polygon")
+            for solid in answers.values():
+                assert solid.status.tolist() == flat.status.tolist()
+                for name in ("time", "time_lower", "time_upper", "last_time"):
+                    found, expected = getattr(solid, name), getattr(flat, name)
+                    # How near a corner passes is followed step by step.
+                    np.testing.assert_allclose(found, expected, rtol=1e-3 if options else 1e-9, err_msg=name)
+                assert (solid.time_lower <= flat.time + 1e-12).all() and (solid.time_upper >= flat.time - 1e-12).all()
 
 
 def test_solids_touch_now_or_never_or_are_unsupported():
@@ -1184,3 +1263,10 @@ def test_plan_says_what_is_computed_and_what_is_not():
     assert "boxes swept for 1 moving object" in scene.plan()
     assert "unsupported unless in contact now: 1 moving solid" in scene.plan()
     assert "2 solids (sphere 2)" in scene.plan()
+    assert "followed" not in scene.plan()
+    push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    boxes = [gs.SceneObject(name, gs.Box((1.0, 1.0, 1.0)), at(5.0 * k, 0.0, 0.0), push) for k, name in enumerate("xyz")]
+    scene = scene_of(boxes)
+    assert "followed in translation: 3 boxes and hulls" in scene.plan() and "unsupported" not in scene.plan()
+    scene.apply(gs.SceneUpdate(add=[gs.SceneObject("ball", gs.Sphere(1.0), at(0.0, 9.0, 0.0))]))
+    assert "unsupported unless in contact now: boxes and hulls that move, against solids of other kinds" in scene.plan()

@@ -321,14 +321,13 @@ def test_a_time_beyond_the_doubles_is_no_plausible_number() -> None:
 
 @pytest.mark.parametrize("tier", TIERS)
 def test_what_is_in_contact_now_but_not_followed(tier) -> None:
-    square, push = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]]), (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    spin = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    square, spin = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]]), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     box = gs.Box([0.5, 0.5, 0.5])
     scene = scene_of(
         [
             gs.SceneObject("spinning", square, twist=spin),
             gs.SceneObject("square", square, (0.5, 0.5, 0.0, *UPRIGHT)),
-            gs.SceneObject("box", box, twist=push),
+            gs.SceneObject("box", box, twist=spin),
             gs.SceneObject("cube", box, (0.0, 0.75, 0.0, *UPRIGHT)),
             gs.SceneObject("next", box, (0.0, 0.0, 1.0, *UPRIGHT)),
         ]

@@ -385,6 +385,36 @@ def test_field_cases(case: dict[str, Any], planar: bool) -> None:
     assert not provable or answer.time_upper[0] >= expected
 
 
+def test_any_finite_numbers(rng: np.random.Generator) -> None:
+    """Whatever the magnitudes, the work is bounded and the outcome keeps its promises."""
+
+    def numbers(*shape: int) -> np.ndarray:
+        with np.errstate(over="ignore", under="ignore"):
+            some = rng.normal(size=shape) * 10.0 ** rng.choice(
+                [0, 0, 0, 1, -1, 5, -20, 100, -100, 290, -310], size=shape
+            )
+        return np.where(rng.random(shape) < 0.2, 0.0, some)
+
+    outcomes: Counter[int] = Counter()
+    for _ in range(120):
+        pair: Pair = {x: numbers(int(rng.integers(1, 6)), 3) for x in "ab"}
+        pair |= {f"{name}{x}": numbers(3) for x in "ab" for name in "vwc"}
+        if rng.random() < 0.3:
+            pair |= {"a": rng.normal(size=(4, 3)), "b": rng.normal(size=(4, 3)) + 3.0}
+        pair["wa"][0] = 1.0
+        t_max = float(rng.choice([0.0, 1.0, 1e-300, 1e300, np.inf]))
+        tolerance = float(rng.choice([1e-6, 1e-300, 1e300, 1e-12]))
+        answer = ask(pair, t_max=t_max, tolerance=tolerance)
+        status, lower, upper = (x[0] for x in (answer.status, answer.time_lower, answer.time_upper))
+        outcomes[int(status)] += 1
+        text = reproducer(**pair, t_max=t_max, tolerance=tolerance) + f"\n{answer}"
+        assert answer.cost.counts["looks"] <= 1.01 * 2**16, text
+        assert np.isnan(lower) if status == gs.NEVER else 0.0 <= lower <= upper and lower <= t_max, text
+        if status == gs.WILL_TOUCH:
+            assert upper <= t_max and (upper - lower <= tolerance or upper == np.nextafter(lower, np.inf)), text
+    assert outcomes[gs.NEVER] >= 10 and outcomes[gs.TOUCHING] + outcomes[gs.OVERLAPPING] >= 5, outcomes
+
+
 # ------------------------------------------------------------------------------------------------------- laws
 
 
@@ -522,6 +552,57 @@ def test_batches(rng: np.random.Generator) -> None:
         t_max=3.0,
         contact_set=False,
     ).points.shape == (0, 3)
+
+
+def with_slack(pair: Pair, slack: tuple[float, float, float], t_max: float) -> tuple[int, float, float]:
+    """Status, lower and upper of a pair in space; slack is margin, uncertainty, drift."""
+    sides = [(b.vertices, b.offsets) for b in (bodies(pair["a"]), bodies(pair["b"]))]
+    motions = [np.concatenate([pair[f"v{x}"], pair[f"w{x}"], pair[f"c{x}"]])[None] for x in "ab"]
+    status, lower, upper, *_ = _core.first_contact_turning(*sides, *motions, t_max, 1e-6, np.array([slack]))
+    return int(status[0]), float(lower[0]), float(upper[0])
+
+
+def test_margins() -> None:
+    """A ball of radius 1/2 on a circle of radius 1 comes to one of radius 1 that is 2 from the middle."""
+    pair = still([(1.0, 0.0, 0.0)], [(0.0, 2.0, 0.0)], wa=np.array([0.0, 0.0, 1.0]), wb=np.zeros(3))
+    expected = math.asin((5.0 - 1.5**2) / 4.0)
+    status, lower, upper = with_slack(pair, (1.5, 0.0, 0.0), 9.0)
+    assert status == gs.WILL_TOUCH and lower <= expected <= upper <= lower + 1e-6
+    assert with_slack(pair, (0.999999, 0.0, 0.0), np.inf)[0] == gs.NEVER
+    assert with_slack(pair, (1.0, 0.0, 0.0), 9.0)[0] == ContactStatus.GRAZING
+    for margin, status in ((2.0, gs.WILL_TOUCH), (2.3, gs.OVERLAPPING), (50.0, gs.OVERLAPPING)):
+        assert with_slack(pair, (margin, 0.0, 0.0), 9.0)[0] == status
+    # Far apart, and no faster than the sum of what is known and what is not.
+    apart = pair | {"b": [(0.0, 100.0, 0.0)], "cb": np.array([0.0, 100.0, 0.0])}
+    assert with_slack(apart, (1.5, 0.0, 0.0), 1e6)[0] == gs.NEVER
+    status, lower, upper = with_slack(apart, (1.5, 0.0, 1.0), 1e6)
+    assert status == ContactStatus.GRAZING and 97.5 <= lower <= 99.5 and upper == np.inf
+
+
+def test_bodies_within_their_uncertainty(rng: np.random.Generator) -> None:
+    """Shifted and given other velocities by no more than was said, they touch when was said."""
+    outcomes: Counter[int] = Counter()
+    inside = 0
+    for _ in range(60):
+        pair = random_pair(rng, 3, size=1.0, rate=2.0, thinness=1.0)
+        off, drift = 10.0 ** rng.uniform(-4, -1), 10.0 ** rng.uniform(-4, -1)
+        status, lower, upper = with_slack(pair, (0.0, off, drift), 3.0)
+        outcomes[status] += 1
+        for _ in range(8):
+            shift, push = rng.normal(size=(2, 3))
+            shift *= off * rng.uniform(0, 1) / np.linalg.norm(shift)
+            push *= drift * rng.uniform(0, 1) / np.linalg.norm(push)
+            real = pair | {"a": pair["a"] + shift, "ca": pair["ca"] + shift, "va": pair["va"] + push}
+            answer = ask(real, t_max=3.0)
+            text = reproducer(**real, off=off, drift=drift) + f"{status} {lower} {upper} {answer}"
+            if answer.status == gs.NEVER:
+                assert status in (gs.NEVER, ContactStatus.GRAZING, gs.TOUCHING) and not upper <= 3.0, text
+            elif answer.status == gs.WILL_TOUCH:
+                assert status != gs.NEVER and lower <= answer.time_upper <= 3.0 and answer.time_lower <= upper, text
+                inside += upper < np.inf
+            else:
+                assert lower == 0.0, text
+    assert outcomes[gs.NEVER] >= 5 and outcomes[ContactStatus.GRAZING] >= 5 and inside >= 50, (outcomes, inside)
 
 
 @pytest.mark.parametrize(

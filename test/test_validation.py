@@ -482,9 +482,9 @@ FAULTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: gs.distance_to_frustum(None, CENTERS),
         "frustum must be Frustum or Frustum2D, got NoneType",
     ),
-    "moving boxes": (
-        lambda: gs.first_contact(boxes(), boxes(), (0, 0, 0), (0, 0, 0)),
-        "a must be Polygons or Polytopes, got Boxes",
+    "moving frustum": (
+        lambda: gs.first_contact(frustum(), boxes(), (0, 0, 0), (0, 0, 0)),
+        "a must be Polygons or Polytopes or Boxes, got Frustum",
     ),
     "plane against space": (
         lambda: gs.first_contact(polygons(), polytopes(), (0, 0), (0, 0)),
@@ -559,6 +559,7 @@ TIERS_ANSWERED = {
     "distance_to_frustum": EVERY,
     "distance_to_frustum.2d": EVERY,
     "first_contact": EVERY,
+    "first_contact.3d": ("bound", "exact"),
     "distance": EVERY,
     "distance.batches": EVERY,
     "intersects": EVERY,
@@ -594,8 +595,10 @@ def test_certificates_need_a_tier_that_leaves_something_to_prove(query: str) -> 
 def numbers_of(value: Any) -> list[Any]:
     """Every number a shape or an answer holds, bit by bit (a nan equals itself); timings aside."""
     fields = getattr(value, "__dataclass_fields__", {})
-    kept = [getattr(value, name, None) for name in fields if name not in ("cost", "_point_a", "_normal")]
-    kept += [getattr(value, name) for name in ("vertices", "point_a", "normal") if hasattr(value, name)]
+    aside = ("cost", "_point_a", "_normal", "_closing_speed")
+    kept = [getattr(value, name, None) for name in fields if name not in aside]
+    found = ("vertices", "point_a", "normal", "closing_speed")
+    kept += [getattr(value, name) for name in found if hasattr(value, name)]
     return [(item.shape, item.tobytes()) if isinstance(item, np.ndarray) else item for item in kept]
 
 

@@ -9,6 +9,7 @@ NB_MODULE(_core, m) {
     geomsrv::bind::define_frustum(m);
     geomsrv::bind::define_point_frustum(m);
     geomsrv::bind::define_polygons(m);
+    geomsrv::bind::define_polytopes(m);
     geomsrv::bind::define_distance(m);
     geomsrv::bind::define_turning(m);
     geomsrv::bind::define_footprint(m);

@@ -11,6 +11,7 @@ void define_validate(nanobind::module_& m);
 void define_frustum(nanobind::module_& m);
 void define_point_frustum(nanobind::module_& m);
 void define_polygons(nanobind::module_& m);
+void define_polytopes(nanobind::module_& m);
 void define_distance(nanobind::module_& m);
 void define_turning(nanobind::module_& m);
 void define_broad_phase(nanobind::module_& m);

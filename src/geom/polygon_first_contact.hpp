@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "geom/contact_status.hpp"
 #include "geom/enclosed.hpp"
 #include "geom/polygon.hpp"
 #include "geom/polygon_overlap.hpp"
@@ -16,13 +17,6 @@
 #include "geom/vec.hpp"
 
 namespace geomsrv {
-
-enum class ContactStatus : std::uint8_t {
-    never = 0,        ///< not within t_max
-    will_touch = 1,   ///< apart now, in contact at `time`
-    touching = 2,     ///< in contact now, depth 0: some direction parts them at once
-    overlapping = 3,  ///< in contact now, depth > 0
-};
 
 struct FirstContact {
     ContactStatus status;

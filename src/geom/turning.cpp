@@ -66,6 +66,7 @@ constexpr double kShortened[] = {0x1p-20, 0x1p-12, 0x1p-8, 0x1p-4, 0x1p-2, 0x1p-
 // and first at so many such steps ahead: after contact, but not long after.
 constexpr double kStepsAhead = 4.0;
 constexpr double kFurtherAhead = 8.0;
+constexpr int kTries = 12;      // before the last one, at the tolerance
 constexpr int kLateTries = 40;  // beyond the tolerance, each twice as far, if there is no step at all
 constexpr int kCrossings = 3;   // tries at proving contact by the intermediate value theorem
 
@@ -182,6 +183,7 @@ void TurningSolver::place(Look& at) const {
 }
 
 TurningSolver::Look TurningSolver::look(double t, Vec3 start) {
+    ++looks_;
     Look at;
     at.t = t;
     place(at);
@@ -558,7 +560,7 @@ double TurningSolver::proven_contact(const Look& at, const Witness& feature, dou
     double ahead = std::max(kStepsAhead * expected, next_up(lower) - lower);
     int late = 0;
     for (int i = 0;; ++i, ahead *= kFurtherAhead) {
-        double t = std::min(lower + ahead, last);
+        double t = i < kTries ? std::min(lower + ahead, last) : last;
         if (!(t < last) && late > 0) {
             // Too late for the tolerance, but better than nothing.
             t = std::min(lower + std::ldexp(tolerance, late), t_max);
@@ -580,9 +582,10 @@ Vec3 TurningSolver::in_world(Vec3 point, double t) const {
     return center_a_ + (t * velocity_a_ + down * point);
 }
 
-TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, double t_max,
-                                    double tolerance, const TurningSlack& slack) {
+TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b, double t_max,
+                                     double tolerance, const TurningSlack& slack) {
     prepare(a, b, slack);
+    looks_ = 0;
     const double end = std::min(t_max, end_of_period());
     const double near = kFar * (a_.body.reach() + b_.body.reach());
     TurningContact out;
@@ -599,8 +602,7 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
     Vec3 start = unit_or(narrow(between_), {1.0, 0.0, 0.0});
     Witness feature;
     double last_step = 0.0;
-    while (out.looks < kMostLooks && a_.body.placeable(t) && b_.body.placeable(t)) {
-        ++out.looks;
+    while (looks_ < kMostLooks && a_.body.placeable(t) && b_.body.placeable(t)) {
         Look at;
         at.t = t;
         place(at);
@@ -623,6 +625,7 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
             }
             start = n;
             if (next > t) {
+                ++looks_;
                 t = next;
                 continue;
             }
@@ -679,12 +682,11 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
                                                      : TurningStatus::grazing;
                 out.lower = next;
                 out.upper = upper;
-                Look then;
-                then.t = next;
-                place(then);
-                a_.body.place(next);
-                b_.body.place(next);
-                const Witness& w = used;
+                const Vec3 predicted = unit_or(direction.normal + step * direction.change, direction.normal);
+                const Look then = look(next, predicted);
+                const bool seen = then.found.state == GjkState::apart && then.found.gap > 0.0;
+                // Where the bodies are too close to be told apart in doubles, what was seen last.
+                const Witness& w = seen ? then.found.witness : used;
                 Vec3 middle;
                 for (int i = 0; i < w.count; ++i) {
                     const Vec3 p = a_.body.placed(static_cast<std::size_t>(w.a[i]));
@@ -692,7 +694,7 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
                     middle = middle + (0.5 * w.weight[i]) * (p + q);
                 }
                 out.point = in_world(middle, next);
-                out.normal = unit_or(direction.normal + step * direction.change, direction.normal);
+                out.normal = seen ? then.found.normal : predicted;
                 return out;
             }
         }
@@ -700,6 +702,13 @@ TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, 
         start = unit_or(direction.normal + step * direction.change, direction.normal);
     }
     out.lower = t;
+    return out;
+}
+
+TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, double t_max,
+                                    double tolerance, const TurningSlack& slack) {
+    TurningContact out = search(a, b, t_max, tolerance, slack);
+    out.looks = looks_;
     return out;
 }
 

@@ -37,7 +37,7 @@ struct TurningContact {
     Vec3 normal;         ///< unit, from a to b, at `lower`; NaN where there is none
     Vec3 point;  ///< between the nearest points at `lower`; of overlapping bodies a common one; or NaN
     Rung rung = Rung::filter;
-    int looks = 0;  ///< how often the bodies were placed and their nearest points found
+    int looks = 0;  ///< how often the bodies were looked at
 };
 
 /// Holds scratch memory, which grows with the largest body seen.
@@ -58,6 +58,8 @@ private:
     struct Look;       // the bodies at one time
     struct Direction;  // along which they are apart, and how it turns
 
+    TurningContact search(const TurningBody& a, const TurningBody& b, double t_max, double tolerance,
+                          const TurningSlack& slack);
     void prepare(const TurningBody& a, const TurningBody& b, const TurningSlack& slack);
     double end_of_period() const;
     Look look(double t, Vec3 start);
@@ -81,6 +83,7 @@ private:
     WideVec3 between_, speed_;  // from the centre of a to that of b, and how fast it changes
     Vec3 velocity_;             // the same, in doubles
     TurningSlack slack_;
+    int looks_ = 0;  // at this pair
     Vec3 center_a_, velocity_a_;
 };
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from random import Random
 
 from geomsrv.hard_cases import Case
-from hard import bodies, frustum_box, point_frustum, polygons  # noqa: F401  they register their classes
+from hard import bodies, frustum_box, motions, point_frustum, polygons  # noqa: F401  they register their classes
 from hard.numbers import mapped
 from hard.registry import CLASSES
 from hard.truth import truth_of

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from oracle import frustum_box, point_frustum, polygon, polytope
+from oracle import frustum_box, moving_polytope, point_frustum, polygon, polytope
 from oracle.vectors import Vector, add, dot, exact, scale, squared_norm, sub
 
 from geomsrv.answers import ContactStatus, CullState
@@ -103,6 +103,18 @@ def of_moving(given: dict[str, Any]) -> Truth:
     return Truth(margin, margin, size, decidable, motion=motion_of(found, extent(p, q)))
 
 
+def of_moving_solids(given: dict[str, Any]) -> Truth:
+    p, q = (exact(given[side]["vertices"]) for side in "PQ")
+    end = exact(given["tmax"])
+    velocity = sub(exact(given["velQ"]), exact(given["velP"]))
+    found = moving_polytope.first_contact(p, given["velP"], q, given["velQ"], end)
+    swept = [*q, *(add(x, scale(end, velocity)) for x in q)]
+    margin = polytope.separation(p, swept).signed_square
+    size = extent(p, swept)
+    decidable = decides(margin, size) and decides(polytope.separation(p, q).signed_square, extent(p, q))
+    return Truth(margin, margin, size, decidable, motion=motion_of(found, extent(p, q)))
+
+
 def motion_of(found: polygon.FirstContact, size: Fraction) -> Motion:
     status = ContactStatus[found.status]
     if not found.hits:
@@ -118,4 +130,5 @@ TRUTHS = {
     "polytope_distance": of_hulls,
     "polygon2d_distance": of_polygons,
     "polygon2d_moving": of_moving,
+    "polyhedra_moving": of_moving_solids,
 }
