@@ -35,6 +35,8 @@ import geomsrv as gs  # noqa: E402
 
 Call = Callable[[], object]
 
+DRIVE = np.array([0.5, 0.0, 0.4])  # a robot's twist
+
 
 @dataclass
 class Scenario:
@@ -70,6 +72,7 @@ def declare(quick: bool) -> list[Scenario]:
     hits = float(np.mean(gs.first_contact(a, b, velocity_a, velocity_b).status == gs.WILL_TOUCH))
     box_a, box_b, turning = scenarios.turning_boxes(20_000 // cut)
     turning_hits = float(np.mean(gs.first_contact(box_a, box_b, **turning, t_max=5.0).status == gs.WILL_TOUCH))
+    scan = scenarios.laser_scan(20_000 // cut)
     few = 1000
     single_boxes = [gs.Box(h) for h in boxes.half_extents[:few]]
     box_poses = scenarios.relative_poses(few, 0.5, 8.0)
@@ -104,6 +107,11 @@ def declare(quick: bool) -> list[Scenario]:
             f"first contact, turning boxes to 1 us, {turning_hits:.0%} hits",
             10_000.0,
             (lambda: gs.first_contact(box_a, box_b, **turning, t_max=5.0), len(box_a)),
+        ),
+        Scenario(
+            "time to collision, points of a scan, robot on an arc",
+            100.0,
+            (lambda: gs.time_to_collision(scenarios.FOOTPRINT, DRIVE, scan, t_max=2.0), len(scan)),
         ),
     ]
     moving_boxes = scenarios.moving_boxes(100_000 // cut)
@@ -264,6 +272,50 @@ def verifications_per_second(quick: bool) -> float:
     return len(answers) * few / (time.thread_time() - begin)
 
 
+@dataclass
+class Stepped:
+    """A simulation with a fixed step beside the proven time of collision."""
+
+    name: str
+    misses: int
+    false_alarms: int
+    errors: np.ndarray  # [s], of the hits that it sees
+    ns: float  # a query
+
+
+def fixed_steps(quick: bool) -> tuple[int, list[Stepped]]:
+    """How many drives end in a collision within 2 s, and what steps of 0.5 s to 0.01 s make of it."""
+    t_max, drives = 2.0, scenarios.drives(100 if quick else 1000)
+    ring = scenarios.FOOTPRINT
+
+    def timed(ask: Callable[[np.ndarray, np.ndarray], float]) -> tuple[np.ndarray, float]:
+        begin = time.thread_time_ns()
+        times = np.array([ask(twist, points) for twist, points in drives])
+        return times, (time.thread_time_ns() - begin) / len(drives)
+
+    lower, ns = timed(lambda twist, points: gs.time_to_collision(ring, twist, points, t_max=t_max).earliest)
+    upper, _ = timed(lambda twist, points: gs.time_to_collision(ring, twist, points, t_max=t_max).earliest_upper)
+    hit = np.isfinite(upper)
+    table = [Stepped("ours", 0, int((np.isfinite(lower) & ~hit).sum()), upper[hit] - lower[hit], ns)]
+    for step in (0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
+        guess, ns = timed(lambda t, p, s=step: baselines.stepped_time_to_collision(ring, t, p, t_max, s))
+        seen = np.isfinite(guess)
+        off = guess[hit & seen] - lower[hit & seen]
+        table.append(Stepped(f"Euler, {step:g} s", int((hit & ~seen).sum()), int((seen & ~hit).sum()), off, ns))
+    return int(hit.sum()), table
+
+
+def print_steps(console: Console, hits: int, table: list[Stepped]) -> None:
+    """Misses, errors, times."""
+    out = Table(title=f"Robot among posts, {hits} real hits within 2 s: simulation with points and fixed steps")
+    for heading in ("way", "misses", "false alarms", "worst error ms", "rms ms", "us per query"):
+        out.add_column(heading, justify="left" if heading == "way" else "right")
+    for s in table:
+        worst, rms = np.abs(s.errors).max() * 1e3, np.sqrt(np.mean(s.errors**2)) * 1e3
+        out.add_row(s.name, f"{s.misses}", f"{s.false_alarms}", f"{worst:.3g}", f"{rms:.3g}", f"{s.ns / 1e3:,.1f}")
+    console.print(out)
+
+
 def print_prices(console: Console, table: list[Price]) -> None:
     """Ratios and wishes."""
     out = Table(title="Price of exactness and of proof: ratio to the same query at float64, in one run")
@@ -314,6 +366,8 @@ def main() -> None:
         price.run(3 if arguments.quick else 9)
     if paid:
         print_prices(console, paid)
+    if arguments.only in "fixed steps":
+        print_steps(console, *fixed_steps(arguments.quick))
     if arguments.only in "verify":
         console.print(
             f"gs.verify: {verifications_per_second(arguments.quick):,.0f} certificates a second (1,000 wanted)"

@@ -181,6 +181,27 @@ def view_of_a_warehouse(n: int, degrees: float) -> tuple[gs.Frustum, gs.Boxes]:
     return gs.Frustum([0, 0, 0], turn.T, near, near, near, 40.0), _turned(center, np.full((n, 3), half), degrees)
 
 
+def drives(n: int = 1000, points: int = 24) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(twist, points seen): a robot at up to 1 m/s and 1.5 rad/s among a few thin posts, none of them at it yet."""
+    rng = np.random.default_rng(SEED)
+    out = []
+    for _ in range(n):
+        twist = np.array([rng.uniform(0.1, 1.0), 0.0, rng.uniform(-1.5, 1.5)])
+        seen = rng.uniform(-2.5, 2.5, (points, 2))
+        out.append((twist, seen[(np.abs(seen) > [0.35, 0.25]).any(axis=1)]))
+    return out
+
+
+def laser_scan(n: int = 20_000) -> np.ndarray:
+    """Points all around, 0.5 m to 5 m away."""
+    rng = np.random.default_rng(SEED)
+    angle = rng.uniform(-np.pi, np.pi, n)
+    return rng.uniform(0.5, 5.0, n)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+FOOTPRINT = np.array([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)])
+
+
 def _turn(degrees: float) -> np.ndarray:
     """About z then x, so that no axis of the world stays one."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))

@@ -10,6 +10,7 @@ from geomsrv._version import __version__
 from geomsrv.answers import (
     Booleans,
     Certificates,
+    CollisionTimes,
     ContactStatus,
     Cost,
     Cull,
@@ -20,7 +21,9 @@ from geomsrv.answers import (
     FrustumRegion,
 )
 from geomsrv.errors import CertificateError, GeometryError, NotAvailableError, SceneError
+from geomsrv.footprint import time_to_collision
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
+from geomsrv.region import Region
 from geomsrv.scene import (
     PairContacts,
     PairDistances,
@@ -60,6 +63,7 @@ __all__ = [
     "Capsule",
     "CertificateError",
     "Certificates",
+    "CollisionTimes",
     "Cone",
     "ContactStatus",
     "Convex",
@@ -89,6 +93,7 @@ __all__ = [
     "Polygon",
     "Polygons",
     "Polytopes",
+    "Region",
     "Scene",
     "SceneCull",
     "SceneError",
@@ -107,6 +112,7 @@ __all__ = [
     "distance_to_frustum",
     "first_contact",
     "intersects",
+    "time_to_collision",
     "verify",
     "verify_record",
 ]

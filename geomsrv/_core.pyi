@@ -57,6 +57,10 @@ def first_contact_turning(
     tolerance: float,
     slack: _F,
 ) -> tuple[_U, _F, _F, _F, _F, _B, _I]: ...
+def points_on_twist(
+    ring: _F, twist: _F, points: _F, velocities: _F, t_max: float, tolerance: float
+) -> tuple[_U, _F, _F, int]: ...
+def turn_of_twist(twist: _F) -> tuple[float, float, float, float]: ...
 def first_contact_world(
     a: tuple[_F | _I, ...],
     b: tuple[_F | _I, ...],

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 __all__ = [
     "Booleans",
     "Certificates",
+    "CollisionTimes",
     "ContactStatus",
     "Cost",
     "Cull",
@@ -308,3 +309,43 @@ class FirstContacts(_Certified):
         float64, on first use.
         """
         return self._closing_speed() if callable(self._closing_speed) else self._closing_speed
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionTimes:
+    """Answer of `time_to_collision`.
+
+    Attributes
+    ----------
+    status : (n,) uint8
+        `ContactStatus` of every obstacle.
+    time, time_lower, time_upper : (n,) float64
+        No contact before ``time`` = ``time_lower`` [s]; contact proven until ``time_upper``, which is inf where there
+        is no proof.  0 if in contact at the start, NaN for NEVER.
+    certain : (n,) bool
+        True where exact arithmetic is proven to give the same ``status``.
+    cost : Cost
+    """
+
+    status: ByteArray
+    time: FloatArray
+    time_lower: FloatArray
+    time_upper: FloatArray
+    certain: BoolArray
+    cost: Cost
+
+    @cached_property
+    def first(self) -> int:
+        """Index of an obstacle that is hit first, by ``time``; -1 if none is."""
+        found = ~np.isnan(self.time)
+        return int(np.nanargmin(self.time)) if found.any() else -1
+
+    @property
+    def earliest(self) -> float:
+        """Time [s] until which there is no contact with any obstacle; inf if there never is."""
+        return float(self.time[self.first]) if self.first >= 0 else float("inf")
+
+    @property
+    def earliest_upper(self) -> float:
+        """Time [s] until which contact with some obstacle is proven; inf if it is not."""
+        return float(np.fmin.reduce(self.time_upper, initial=np.inf))

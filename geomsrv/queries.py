@@ -22,6 +22,7 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
+from geomsrv.region import Region, distance_regions, first_contact_regions, intersects_regions
 from geomsrv.shapes import (
     Boxes,
     Capsule,
@@ -198,8 +199,8 @@ def distance_to_frustum(
 
 
 def first_contact(
-    a: Polygons | Polytopes | Boxes,
-    b: Polygons | Polytopes | Boxes,
+    a: Boxes | Polygons | Polytopes | Region,
+    b: Boxes | Polygons | Polytopes | Region,
     velocity_a: ArrayLike,
     velocity_b: ArrayLike,
     *,
@@ -218,7 +219,8 @@ def first_contact(
     Parameters
     ----------
     a, b : Polygons (2D), Polytopes or Boxes (3D)
-        n against n, or one against n.
+        n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another;
+        only without a contact set, and piece by piece, so at the cost of all pairs of pieces.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
@@ -292,6 +294,19 @@ def first_contact(
     (array([2.]), [[1.0, 0.0, 0.0]], array([2.]), [[3.0, 0.5, 0.0]])
     """
     start = time.perf_counter_ns()
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {
+            "t_max": t_max,
+            "accuracy": accuracy,
+            "contact_set": contact_set,
+            "certificates": certificates,
+            "angular_velocity_a": angular_velocity_a,
+            "angular_velocity_b": angular_velocity_b,
+            "center_a": center_a,
+            "center_b": center_b,
+            "tolerance": tolerance,
+        }
+        return first_contact_regions(first_contact, a, b, (velocity_a, velocity_b), options)
     if turns(angular_velocity_a, angular_velocity_b):
         return first_contact_turning(
             (a, b),
@@ -334,8 +349,8 @@ def first_contact(
 
 
 def distance(
-    a: Shape | Batch,
-    b: Shape | Batch,
+    a: Shape | Batch | Region,
+    b: Shape | Batch | Region,
     poses_ab: ArrayLike | None = None,
     *,
     accuracy: str = "float64",
@@ -347,7 +362,8 @@ def distance(
     Parameters
     ----------
     a, b : Shape or Frustum with `poses_ab`; otherwise batches (Boxes, Polygons, Polytopes, Frustum)
-        Two shapes at n relative poses, or two batches in world coordinates, n against n or one against n.
+        Two shapes at n relative poses, or two batches in world coordinates, n against n or one against n.  A Region is
+        one body, in world coordinates here, against Polygons or another, without penetration.
     poses_ab : (n, 7) or (7,) float, optional
         Poses of b in a: x y z [m], qx qy qz qw.
     accuracy : str
@@ -379,6 +395,9 @@ def distance(
     >>> gs.distance(gs.Sphere(1.0), gs.Sphere(1.0), [1.5, 0, 0, 0, 0, 0, 1], want=("penetration",)).distance
     array([-0.5])
     """
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
+        return distance_regions(distance, a, b, want, options)
     start = time.perf_counter_ns()
     effects = _validate.want(want, ("distance", "witness", "penetration"))
     signed, poses = "penetration" in effects, None
@@ -424,8 +443,8 @@ def distance(
 
 
 def intersects(
-    a: Shape | Batch,
-    b: Shape | Batch,
+    a: Shape | Batch | Region,
+    b: Shape | Batch | Region,
     poses_ab: ArrayLike | None = None,
     *,
     accuracy: str = "float64",
@@ -459,6 +478,9 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    if isinstance(a, Region) or isinstance(b, Region):
+        options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
+        return intersects_regions(intersects, a, b, options)
     if poses_ab is None and isinstance(a, Polygons):
         answer, meet, certain = _polygon_distance(a, b, True, accuracy, time.perf_counter_ns())
         proven = _validate.certificates(certificates, answer.cost.accuracy)

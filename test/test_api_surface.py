@@ -47,6 +47,7 @@ Triangle(a, b, c)
 Segment(a, b)
 Point(p)
 Polygon(vertices)
+Region(outline, holes=())
 cull(frustum, boxes, *, accuracy='float64', certificates=False)
 distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False)
 first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', contact_set=True,
@@ -55,6 +56,7 @@ first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', co
 distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',),
     certificates=False)
 intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False)
+time_to_collision(footprint, twist, obstacles, *, velocities=None, t_max=inf, tolerance=1e-06)
 verify(answer)
 verify_record(record)
 Scene(*, fixed_frame='world', allowed_pairs=(), transforms=None)
@@ -68,6 +70,7 @@ ATTRIBUTES = {
     "Booleans": "value certain status cost certificates",
     "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain closing_speed "
     "cost certificates",
+    "CollisionTimes": "status time time_lower time_upper certain first earliest earliest_upper cost",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",
     "SceneUpdate": "add remove clear",

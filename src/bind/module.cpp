@@ -12,5 +12,6 @@ NB_MODULE(_core, m) {
     geomsrv::bind::define_polytopes(m);
     geomsrv::bind::define_distance(m);
     geomsrv::bind::define_turning(m);
+    geomsrv::bind::define_footprint(m);
     geomsrv::bind::define_broad_phase(m);
 }

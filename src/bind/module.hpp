@@ -15,5 +15,6 @@ void define_polytopes(nanobind::module_& m);
 void define_distance(nanobind::module_& m);
 void define_turning(nanobind::module_& m);
 void define_broad_phase(nanobind::module_& m);
+void define_footprint(nanobind::module_& m);
 
 }  // namespace geomsrv::bind
