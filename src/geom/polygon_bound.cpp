@@ -8,12 +8,12 @@
 
 #include "geom/exact_sign.hpp"
 #include "geom/rounding.hpp"
+#include "geom/swept_volume.hpp"
 
 namespace geomsrv {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Vec2 kNowhere{kNaN, kNaN};
 
@@ -63,32 +63,6 @@ double least_distance(const Volume& a, const Volume& b) {
     const double circles = next_down(below(std::hypot(apart.x, apart.y)) - next_up(a.radius + b.radius));
     return std::max(boxes, circles);
 }
-
-/// Bounds of a difference of velocities.
-struct Rate {
-    double least, most;
-};
-
-Rate rate_of(double from, double to) {
-    // At rest nothing moves.
-    return from == to ? Rate{0.0, 0.0} : Rate{next_down(to - from), next_up(to - from)};
-}
-
-/// When volumes can be in contact.
-struct Span {
-    double enter = 0.0;
-    double leave = kInfinity;
-
-    /// A gap of at least so much closes at a rate of at most so much.
-    void clip(double gap, double rate) {
-        if (gap > 0.0) {
-            enter = std::max(enter, rate > 0.0 ? next_down(gap / rate) : 0.0);
-            leave = rate > 0.0 ? leave : -1.0;
-        } else if (rate < 0.0) {
-            leave = std::min(leave, next_up(gap / rate));
-        }
-    }
-};
 
 }  // namespace
 

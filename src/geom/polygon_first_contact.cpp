@@ -28,6 +28,7 @@
 #include "geom/double_double.hpp"
 #include "geom/exact_sign.hpp"
 #include "geom/lanes.hpp"
+#include "geom/polygon_marks.hpp"
 #include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
@@ -225,21 +226,6 @@ double earliest_exit(const PolygonPair& pair, const Motion& motion, const Slacks
     return std::max(exit, 0.0);
 }
 
-/// A vertex and where it lies along the contact line.
-struct Mark {
-    int side;
-    std::size_t vertex;
-    double place;
-};
-
-/// Ends of the common part of two faces, in order counter-clockwise around a; not a segment: one point
-/// between them.
-struct ContactMarks {
-    Mark low;
-    Mark high;
-    bool segment;
-};
-
 /// Contact at `moment` along an axis: the faces that meet there are known from it.
 ///
 ///      face of the other polygon          |------------------------|
@@ -385,22 +371,8 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
         axis = pair_.widest_gap();
     }
     const ContactMarks marks = contact_marks(pair_, motion, slacks, axis, moment);
-    const auto moved = [&](const Mark& mark) {
-        const Vec2 from = pair_.side(mark.side).ring[mark.vertex];
-        const Vec2 velocity = (mark.side == 0 ? a : b).velocity;
-        if (motion.scale_exponent == 0 && pair_.scale_exponent() == 0) {
-            return from + result.time * velocity;
-        }
-        // The time in seconds may be subnormal, its product with a velocity beyond the doubles.
-        const Vec2 way = moment * motion.scaled(velocity);
-        return pair_.moved(from, {way.x, 0.0}, {way.y, 0.0});
-    };
-    const bool one_vertex = marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex;
-    const Vec2 low = moved(marks.low);
-    const Vec2 high = moved(marks.high);
-    points_[0] = marks.segment || one_vertex ? low : 0.5 * low + 0.5 * high;
-    points_[1] = high;
-    result.points = {points_.data(), marks.segment ? 2U : 1U};
+    result.points =
+        contact_points(pair_, motion, marks, {a.velocity, b.velocity}, moment, result.time, points_);
     return result;
 }
 

@@ -16,6 +16,7 @@
 #include <span>
 
 #include "geom/lanes.hpp"
+#include "geom/polygon_marks.hpp"
 #include "geom/polygon_window.hpp"
 #include "geom/power_of_two.hpp"
 #include "geom/rounding.hpp"
@@ -292,20 +293,6 @@ double level_of(const PolygonPair& pair, Vec2 axis) {
     const double size = std::fabs(axis.x) + std::fabs(axis.y);
     return 2.0 * (kSingleGapError * kSingleRoundoff) * pair.reach() * size + kPairUnderflow;
 }
-
-/// A vertex and where it lies along the contact line.
-struct Mark {
-    int side;
-    std::size_t vertex;
-    double place;
-};
-
-/// Ends of the common part of two faces, in order counter-clockwise around a; not a segment: one point
-/// between them.
-struct ContactMarks {
-    Mark low, high;
-    bool segment;
-};
 
 /// Contact at `moment`, known to `doubt`, along an axis: see `contact_marks` in polygon_first_contact.cpp.
 /// What is level, or one point, up to the rounding of float counts as such.
@@ -689,22 +676,8 @@ FirstContact SingleFirstContactSolver::solve(const MovingPolygon& a, const Movin
     const double doubt = window.apart ? back * (std::min(entered, leave) - enter) : 0.0;
     moment = back * moment;
     const ContactMarks marks = contact_marks(pair_, axis, motion.velocity, moment, doubt);
-    const auto moved = [&](const Mark& mark) {
-        const Vec2 from = places.side(mark.side).ring[mark.vertex];
-        const Vec2 velocity = (mark.side == 0 ? a : b).velocity;
-        if (motion.scale_exponent == 0 && places.scale_exponent() == 0) {
-            return from + result.time * velocity;
-        }
-        // The time in seconds may be subnormal, its product with a velocity beyond the doubles.
-        const Vec2 way = moment * motion.scaled(velocity);
-        return places.moved(from, {way.x, 0.0}, {way.y, 0.0});
-    };
-    const bool one_vertex = marks.low.side == marks.high.side && marks.low.vertex == marks.high.vertex;
-    const Vec2 low = moved(marks.low);
-    const Vec2 high = moved(marks.high);
-    points_[0] = marks.segment || one_vertex ? low : 0.5 * low + 0.5 * high;
-    points_[1] = high;
-    result.points = {points_.data(), marks.segment ? 2U : 1U};
+    result.points =
+        contact_points(places, motion, marks, {a.velocity, b.velocity}, moment, result.time, points_);
     return result;
 }
 

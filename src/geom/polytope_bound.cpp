@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "geom/rounding.hpp"
+#include "geom/swept_volume.hpp"
 
 namespace geomsrv {
 
@@ -107,32 +108,6 @@ Volume around_hull(const ExactBody& body) {
 Volume around(const ExactBody& body) {
     return body.kind == ExactBody::Kind::hull ? around_hull(body) : around_box(body);
 }
-
-/// Bounds of a difference of velocities.
-struct Rate {
-    double least, most;
-};
-
-Rate rate_of(double from, double to) {
-    // At rest nothing moves.
-    return from == to ? Rate{0.0, 0.0} : Rate{next_down(to - from), next_up(to - from)};
-}
-
-/// When volumes can be in contact.
-struct Span {
-    double enter = 0.0;
-    double leave = kInfinity;
-
-    /// A gap of at least so much closes at a rate of at most so much.
-    void clip(double gap, double rate) {
-        if (gap > 0.0) {
-            enter = std::max(enter, rate > 0.0 ? next_down(gap / rate) : 0.0);
-            leave = rate > 0.0 ? leave : -1.0;
-        } else if (rate < 0.0) {
-            leave = std::min(leave, next_up(gap / rate));
-        }
-    }
-};
 
 }  // namespace
 
