@@ -58,7 +58,7 @@ def survives(run: Callable[[], Any]) -> str:
             os.dup2(sink, 1)
             os.dup2(sink, 2)
             run()
-        except BaseException:
+        except BaseException:  # whatever it was: this copy must never go on as if it were the process
             os._exit(1)
         os._exit(0)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

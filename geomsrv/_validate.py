@@ -172,6 +172,13 @@ def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def common_length(a: int, b: int) -> int:
+    """Number of items of two batches, n against n or one against n."""
+    if a != b and 1 not in (a, b):
+        raise GeometryError(f"a and b must have the same length, or one of them length 1; got {a} and {b}")
+    return b if a == 1 else a
+
+
 def accuracy(value: Any, available: tuple[str, ...] = ("float64",)) -> str:
     """A tier that the query answers."""
     if not isinstance(value, str) or value not in ACCURACIES:

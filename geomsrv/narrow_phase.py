@@ -30,6 +30,7 @@ __all__ = [
     "distance_rows",
     "first_contact_rows",
     "followed_solids",
+    "placed_boxes",
     "placed_distances",
     "placed_hulls",
     "polygon_contacts",
@@ -416,12 +417,16 @@ def _by_kind(
 def _side(world: World, rows: IntArray, boxes: bool, shift: FloatArray | None) -> _Side:
     """A batch of boxes, literally, or of hulls, as the engine reads it."""
     if boxes:
-        center = world.poses[rows, :3]
-        center = np.ascontiguousarray(center if shift is None else center + shift)
-        axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
-        return center, axes, world.table.half[world.shape[rows]]
+        center, axes, half = placed_boxes(world, rows)
+        return (center if shift is None else center + shift), axes, half
     vertices, offsets = placed_hulls(world, rows)
     return (vertices if shift is None else vertices + np.repeat(shift, np.diff(offsets), axis=0)), offsets
+
+
+def placed_boxes(world: World, rows: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Centres, axes and half extents of boxes in the fixed frame, literally."""
+    axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
+    return np.ascontiguousarray(world.poses[rows, :3]), axes, world.table.half[world.shape[rows]]
 
 
 def placed_hulls(world: World, rows: IntArray) -> tuple[FloatArray, IntArray]:

@@ -321,7 +321,7 @@ def first_contact(
         )
     _expect(a, (Polygons, Polytopes, Boxes), "a")
     _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
-    count = _common_length(len(a), len(b))
+    count = _validate.common_length(len(a), len(b))
     d = 2 if isinstance(a, Polygons) else 3
     moving_a, moving_b = (
         _velocities(v, name, count, d) for v, name in ((velocity_a, "velocity_a"), (velocity_b, "velocity_b"))
@@ -509,7 +509,7 @@ def _polygon_distance(
     """The engine's answer for polygons; whether they meet, and whether that is certain."""
     tier = _validate.accuracy(accuracy, TIERS)
     _expect(b, Polygons, "b")
-    _common_length(len(a), len(b))
+    _validate.common_length(len(a), len(b))
     gap, lower, upper, point_a, point_b, normal, status, meet, certain, rungs = _core.distance_polygons(
         a.vertices, a.offsets, b.vertices, b.offsets, penetration, tier
     )
@@ -526,7 +526,7 @@ def _batch_distance(a: Any, b: Any, penetration: bool, tier: str, evidence: bool
     """The engine's answer for two batches in world coordinates."""
     _expect(a, (Boxes, Polygons, Polytopes, Frustum), "a")
     _expect(b, (Boxes, Polytopes, Frustum), "b")
-    _common_length(_length(a), _length(b))
+    _validate.common_length(_length(a), _length(b))
     return _core.distance_world(_side(a), _side(b), penetration, tier, evidence)
 
 
@@ -541,12 +541,6 @@ def _side(batch: Boxes | Polytopes | Frustum) -> tuple[Any, ...]:
 
 def _length(side: Batch) -> int:
     return 1 if isinstance(side, Frustum) else len(side)
-
-
-def _common_length(a: int, b: int) -> int:
-    if a != b and 1 not in (a, b):
-        raise GeometryError(f"a and b must have the same length, or one of them length 1; got {a} and {b}")
-    return b if a == 1 else a
 
 
 def _velocities(value: ArrayLike, name: str, count: int, dimension: int) -> FloatArray:

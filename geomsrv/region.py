@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from geomsrv import _validate
 from geomsrv.answers import Booleans, ContactStatus, Cost, Distances, FirstContacts
 from geomsrv.errors import GeometryError, NotAvailableError
-from geomsrv.shapes import FloatArray, Polygons
+from geomsrv.shapes import FloatArray, Polygons, frozen
 
 __all__ = ["Region", "distance_regions", "first_contact_regions", "intersects_regions"]
 
@@ -63,13 +63,9 @@ class Region:
     def __init__(self, outline: ArrayLike, holes: Iterable[ArrayLike] = ()) -> None:
         rings = [_validate.floats(outline, "outline", (None, 2))]
         rings += [_validate.floats(hole, f"holes[{i}]", (None, 2)) for i, hole in enumerate(holes)]
-        frozen = []
-        for ring in rings:
-            copy = ring.copy()
-            copy.setflags(write=False)
-            frozen.append(copy)
-        object.__setattr__(self, "outline", frozen[0])
-        object.__setattr__(self, "holes", tuple(frozen[1:]))
+        outline, *inner = map(frozen, rings)
+        object.__setattr__(self, "outline", outline)
+        object.__setattr__(self, "holes", tuple(inner))
         _check(self._whole)
 
     @cached_property
@@ -200,10 +196,7 @@ def _common(a: Any, b: Any) -> int:
     for body, name in ((a, "a"), (b, "b")):
         if not isinstance(body, (Region, Polygons)):
             raise GeometryError(f"{name} must be Region or Polygons, got {type(body).__name__}")
-    one, two = (1 if isinstance(body, Region) else len(body) for body in (a, b))
-    if one != two and 1 not in (one, two):
-        raise GeometryError(f"a and b must have the same length, or one of them length 1; got {one} and {two}")
-    return two if one == 1 else one
+    return _validate.common_length(*(1 if isinstance(body, Region) else len(body) for body in (a, b)))
 
 
 def _pairs(a: Any, b: Any) -> Iterator[tuple[Polygons, Polygons]]:

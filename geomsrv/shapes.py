@@ -53,14 +53,17 @@ CORNER_SIGNS = np.array([[2.0 * (i >> k & 1) - 1.0 for k in range(3)] for i in r
 CORNER_ERROR = 8 * float(np.finfo(np.float64).eps)
 
 
-def _freeze(value: Any, **arrays: Any) -> None:
-    """Set fields of a frozen dataclass; arrays become read-only copies: no shape changes under a query."""
-    for name, array in arrays.items():
-        if isinstance(array, np.ndarray):
-            # Always a copy: even the owner of a read-only array can make it writeable again.
-            array = array.copy()
-            array.setflags(write=False)
-        object.__setattr__(value, name, array)
+def frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """A read-only copy: no shape changes under a query, and even the owner of a read-only array can undo that."""
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy
+
+
+def _freeze(value: Any, **fields: Any) -> None:
+    """Set fields of a frozen dataclass, arrays as read-only copies."""
+    for name, field in fields.items():
+        object.__setattr__(value, name, frozen(field) if isinstance(field, np.ndarray) else field)
 
 
 # ------------------------------------------------------------------------------------------------ view frusta

@@ -46,12 +46,7 @@ def first_contact_turning(
         if not isinstance(body, kinds):
             names = " or ".join(kind.__name__ for kind in (kinds if name == "b" else (Boxes, Polygons, Polytopes)))
             raise GeometryError(f"{name} must be {names}, got {type(body).__name__}")
-    sizes = [len(body) for body in bodies]
-    if sizes[0] != sizes[1] and 1 not in sizes:
-        raise GeometryError(
-            f"a and b must have the same length, or one of them length 1; got {sizes[0]} and {sizes[1]}"
-        )
-    count = sizes[1] if sizes[0] == 1 else sizes[0]
+    count = _validate.common_length(len(bodies[0]), len(bodies[1]))
     d = 2 if flat else 3
     end = _validate.limit(t_max, "t_max")
     step = _validate.scalar(tolerance, "tolerance", positive=True)

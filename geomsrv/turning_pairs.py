@@ -22,6 +22,7 @@ from geomsrv.narrow_phase import (
     count_kinds,
     first_contact_rows,
     followed_solids,
+    placed_boxes,
     placed_hulls,
 )
 from geomsrv.world import ROUNDOFF, World, gather
@@ -118,8 +119,7 @@ def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatA
     if flat:
         return gather(*world.rings, rows)
     if boxes:
-        axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
-        return np.ascontiguousarray(world.poses[rows, :3]), axes, world.table.half[world.shape[rows]]
+        return placed_boxes(world, rows)
     kinds = world.kinds[rows]
     hull, capsule = map(_core.shape_kinds().index, ("convex", "capsule"))
     if (kinds == hull).all():

@@ -88,7 +88,7 @@ def test_stub_names_what_the_module_has():
 def test_commands_of_the_makefile_run_on_the_installed_package(target):
     """Started in the source root, whose package has no engine, they must not import it from there."""
     if not (SOURCE / ".venv/bin/python").exists():
-        pytest.skip("not built by make")
+        pytest.skip("these commands are for what make has built; this source tree has no .venv")
     command = f"make --no-print-directory --dry-run --assume-old build {target} ARGS=--help | tail -n 1 | sh"
     ran = subprocess.run(command, shell=True, cwd=SOURCE, capture_output=True, text=True, timeout=60)
     assert "usage:" in ran.stdout and not ran.stderr, ran.stderr
