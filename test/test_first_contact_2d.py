@@ -11,18 +11,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from conftest import hard_cases, reproducer
+from contact_answers import STATUS, points_of, set_distance
 from oracle import polygon as exact
 from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, slender_pair
 
 import geomsrv as gs
 
 INF = math.inf
-STATUS = {
-    "NEVER": gs.NEVER,
-    "WILL_TOUCH": gs.WILL_TOUCH,
-    "TOUCHING": gs.TOUCHING,
-    "OVERLAPPING": gs.OVERLAPPING,
-}
 
 # What float64 decides about a time is good to this relative error: gap and rate to 2^-46 each, or better (kSharp).
 TIME_ERROR = 2.0**-44
@@ -33,16 +28,6 @@ LARGEST_SLACK = 2.0**-42
 def contact(a, b, velocity_a=(0.0, 0.0), velocity_b=(0.0, 0.0), **options):
     """Answer for one pair."""
     return gs.first_contact(polygons(a), polygons(b), velocity_a, velocity_b, **options)
-
-
-def points_of(answer, i=0):
-    return answer.points[answer.point_offsets[i] : answer.point_offsets[i + 1]]
-
-
-def set_distance(points, others):
-    """Largest distance from a point of one set to the nearest of the other, both ways."""
-    apart = np.abs(np.asarray(points, float)[:, None] - np.asarray(others, float)[None]).max(axis=-1)
-    return max(apart.min(axis=0).max(), apart.min(axis=1).max())
 
 
 # ------------------------------------------------------------------------------------------------- hard cases

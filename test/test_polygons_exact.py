@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from conftest import hard_cases, reproducer
+from contact_answers import STATUS, points_of
 from oracle import polygon as exact
 from oracle.vectors import compare_root, dot, nearest_double, root_double, squared_norm, sub
 from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, slender_pair
@@ -18,7 +19,6 @@ from polygon_scenes import SQUARE, Turn, hull, polygons, random_ring, shifted, s
 import geomsrv as gs
 
 INF = math.inf
-STATUS = {"NEVER": gs.NEVER, "WILL_TOUCH": gs.WILL_TOUCH, "TOUCHING": gs.TOUCHING, "OVERLAPPING": gs.OVERLAPPING}
 NUMBERS = ("status", "time", "time_lower", "time_upper", "last_time")
 
 
@@ -32,10 +32,6 @@ def contacts(scenes, accuracy="exact", **options):
     a, b = polygons(*(s[0] for s in scenes)), polygons(*(s[2] for s in scenes))
     velocities = (np.array([s[k] for s in scenes], float).reshape(-1, 2) for k in (1, 3))
     return gs.first_contact(a, b, *velocities, t_max=t_max, accuracy=accuracy, **options)
-
-
-def points_of(answer, i=0):
-    return answer.points[answer.point_offsets[i] : answer.point_offsets[i + 1]]
 
 
 # ------------------------------------------------------------------------------------------ the exact answers

@@ -14,9 +14,20 @@ from typing import Any
 
 from oracle import polygon, polytope
 from oracle.polygon import NEVER, OVERLAPPING, TOUCHING, WILL_TOUCH, FirstContact
-from oracle.vectors import Vector, add, cross, dot, exact, primitive, scale, squared_norm, sub, to_integers
-
-Constraint = tuple[Vector, Fraction]
+from oracle.vectors import (
+    Constraint,
+    Vector,
+    add,
+    clip_ray,
+    cross,
+    dot,
+    exact,
+    primitive,
+    scale,
+    squared_norm,
+    sub,
+    to_integers,
+)
 
 
 def constraints(points: Sequence[Vector]) -> list[Constraint]:
@@ -129,21 +140,6 @@ def first_contact(
     shared = intersection(*moved) if contact else []
     speed = None if first == 0 else max(_speeds(bounds, ray, first))
     return FirstContact(status, first, last, last is not None, shared, speed, start)
-
-
-def clip_ray(bounds: Sequence[Constraint], ray: Vector) -> tuple[Fraction, Fraction | None] | None:
-    """First and last t >= 0 with t * ray within the bounds; the last is None if there is none; None for a miss."""
-    first, last = Fraction(0), None
-    for normal, offset in bounds:
-        speed = dot(normal, ray)
-        if speed == 0:
-            if offset < 0:
-                return None
-        elif speed > 0:
-            last = offset / speed if last is None else min(last, offset / speed)
-        else:
-            first = max(first, offset / speed)
-    return None if last is not None and last < first else (first, last)
 
 
 def _start(bounds: Sequence[Constraint]) -> Fraction:

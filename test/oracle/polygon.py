@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from oracle.vectors import Vector, add, cross2, dot, exact, scale, squared_norm, sub, to_integers
+from oracle.vectors import Constraint, Vector, add, clip_ray, cross2, dot, exact, scale, squared_norm, sub, to_integers
 
 Ring = list[Vector]
 
@@ -162,7 +162,7 @@ def first_contact(p: Any, velocity_p: Any, q: Any, velocity_q: Any, t_max: Any) 
     end = None if t_max == float("inf") else exact(t_max)
     ring, ray = difference(p, q), sub(v_q, v_p)
     start = _origin_separation(ring)
-    span = clip_ray(ring, ray)
+    span = clip_ray(constraints(ring), ray)
     if span is None or (end is not None and span[0] > end):
         return FirstContact(NEVER, None, None, True, [], None, start.signed_square)
     first, last = span
@@ -176,22 +176,7 @@ def first_contact(p: Any, velocity_p: Any, q: Any, velocity_q: Any, t_max: Any) 
     return FirstContact(status, first, last, last is not None, contact, speed, start.signed_square)
 
 
-def clip_ray(ring: Ring, ray: Vector) -> tuple[Fraction, Fraction | None] | None:
-    """First and last t >= 0 with t * ray in the ring; the last is None if there is none; None for a miss."""
-    first, last = Fraction(0), None
-    for normal, offset in constraints(ring):
-        speed = dot(normal, ray)
-        if speed == 0:
-            if offset < 0:
-                return None
-        elif speed > 0:
-            last = offset / speed if last is None else min(last, offset / speed)
-        else:
-            first = max(first, offset / speed)
-    return None if last is not None and last < first else (first, last)
-
-
-def constraints(ring: Ring) -> Iterator[tuple[Vector, Fraction]]:
+def constraints(ring: Ring) -> Iterator[Constraint]:
     """(n, d) with n . x <= d for exactly the points of the ring; a point is bounded along both axes."""
     if len(ring) == 1:
         for n in ((1, 0), (0, 1), (-1, 0), (0, -1)):

@@ -23,6 +23,8 @@ BITS = 240
 ONE = 1 << BITS
 #: More than 200 operations, each rounding 2^-240 of numbers below 2^60, could ever add up to.
 ERROR = Fraction(1, 1 << 150)
+#: What a length or speed in float64, of fewer than 100 roundings of 2^-53, is made larger by to be an upper bound.
+ROUNDED_UP = 1e-12
 
 
 def _arctangent_of_inverse(x: int) -> int:
@@ -96,7 +98,7 @@ class Turning:
     @cached_property
     def reach(self) -> float:
         """An upper bound of how far any vertex is from the centre."""
-        return max(sqrt(dot(r, r)) for r in (sub(v, self.center) for v in self.vertices)) * (1 + 1e-12)
+        return max(sqrt(dot(r, r)) for r in (sub(v, self.center) for v in self.vertices)) * (1 + ROUNDED_UP)
 
     @cached_property
     def _parts(self) -> list[tuple[Vector, Vector, Vector]]:
@@ -170,7 +172,7 @@ def apart_until(a: Turning, b: Turning, end: Fraction, most_steps: int = 20000) 
             w = [float(x) for x in body.angular]
             across = cross(tuple(along), tuple(w))
             closing += sqrt(sum(x * x for x in across)) * body.reach
-        closing += 1e-12 * (length * sqrt(sum(v * v for v in relative)) + 1e-300)
+        closing += ROUNDED_UP * (length * sqrt(sum(v * v for v in relative)) + 1e-300)
         if closing <= 0:
             return end
         t += Fraction(int(space / Fraction(closing) * (1 - Fraction(1, 1 << 40)) * (1 << 160)), 1 << 160)

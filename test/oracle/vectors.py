@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 Vector = tuple[Any, ...]
+Constraint = tuple[Vector, Fraction]  # (n, d): n . x <= d
 
 ROOT_BITS = 128  # relative width of a square root's bracket is 2**-ROOT_BITS, far below an ulp
 
@@ -120,3 +121,18 @@ def root_double(square: Any) -> float:
         return low
     middle = (Fraction(low) + Fraction(high)) / 2
     return low if square < middle * middle else high
+
+
+def clip_ray(bounds: Iterable[Constraint], ray: Vector) -> tuple[Fraction, Fraction | None] | None:
+    """First and last t >= 0 with t * ray within the bounds; the last is None if there is none; None for a miss."""
+    first, last = Fraction(0), None
+    for normal, offset in bounds:
+        speed = dot(normal, ray)
+        if speed == 0:
+            if offset < 0:
+                return None
+        elif speed > 0:
+            last = offset / speed if last is None else min(last, offset / speed)
+        else:
+            first = max(first, offset / speed)
+    return None if last is not None and last < first else (first, last)
