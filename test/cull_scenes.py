@@ -100,6 +100,24 @@ def ridge(rng, angle, gap, ratio):
     return frustum, gs.Boxes([frustum.origin + center @ axes], [signs * (box_axes @ axes)[order]], [half[order]])
 
 
+def leaning(rng, count):
+    """Boxes with one axis of the frustum; the others lean, so the face that meets a far corner is not across it."""
+    axes = np.array(FRAMES[rng.integers(3)])
+    left, up = rng.integers(1, 17, 2) / 8
+    frustum = gs.Frustum([0, 0, 0], axes, left, up, 1.0, 4.0)
+    shared = rng.integers(2)
+    rows = np.tile(np.roll(np.eye(3), -shared, axis=0), (count, 1, 1))
+    rows[:, 1:] += rng.uniform(-0.004, 0.004, (count, 2, 3))
+    rows[:, 1:] /= np.linalg.norm(rows[:, 1:], axis=2, keepdims=True)
+    half = rng.uniform(0.5, 2.0, (count, 3))
+    normal = np.cross(rows[:, 1], rows[:, 2])
+    on_face = np.einsum("nk,nkc->nc", half[:, 1:] * rng.uniform(-0.9, 0.9, (count, 2)), rows[:, 1:])
+    gap = rng.choice([-1, 1], (count, 1)) * 10.0 ** rng.uniform(-16, -3, (count, 1))
+    corner = 4.0 * np.array([left, up, 1.0])
+    center = corner + gap * normal + half[:, :1] * rows[:, 0] + on_face
+    return frustum, gs.Boxes(center @ axes, rows @ axes, half)
+
+
 def needles(rng, count):
     """Boxes of rounding width along a slanted edge, tilted and displaced by rounding: a rounded axis means nothing."""
     axes = np.array(FRAMES[rng.integers(3)])

@@ -28,6 +28,7 @@ from oracle.vectors import cross, dot
 from polygon_scenes import polygons, random_ring
 
 import geomsrv as gs
+from geomsrv import evidence
 from geomsrv.answers import json_line
 from geomsrv.cli import main
 from geomsrv.verify import CertificateError, verify_lines, verify_record
@@ -494,6 +495,29 @@ def test_answers_are_proven_and_their_records_true(tier, tmp_path, capsys) -> No
         assert (tmp_path / "answer.jsonl").read_text().splitlines() == lines == list(answer.certificates.lines())
     assert claimed[True] > 5 * claimed[False]
     capsys.readouterr()
+
+
+def test_exact_answer_ends_at_its_proof(monkeypatch, rng) -> None:
+    """The corners that the engine hands over already hold the nearest point: nothing is left to be searched for."""
+    sizes: Counter[int] = Counter()
+    search = evidence._simplex
+
+    def watched(a, b, start):
+        found = search(a, b, start)
+        assert start and all(pair in start for pair in found), reproducer(a=a, b=b, start=start, found=found)
+        sizes[len(found)] += 1
+        return found
+
+    monkeypatch.setattr(evidence, "_simplex", watched)
+    for _ in range(12):
+        axes = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+        low, high = sorted(rng.uniform(-2.0, 2.0, 2)), sorted(rng.uniform(-2.0, 2.0, 2))
+        view = gs.Frustum(rng.normal(size=3), axes, bounds=(*low, *high), near=1.0, far=rng.uniform(1.5, 4.0))
+        for record in gs.distance_to_frustum(
+            view, rng.uniform(-8.0, 8.0, (40, 3)), accuracy="exact", certificates=True
+        ).certificates:
+            assert proves(record)
+    assert min(sizes[1], sizes[2], sizes[3]) >= 15, sizes
 
 
 TAMPERED = [

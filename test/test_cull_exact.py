@@ -19,6 +19,7 @@ from cull_scenes import (
     describe,
     exact_state,
     lattice,
+    leaning,
     needles,
     ridge,
     scaled,
@@ -230,6 +231,16 @@ def test_needles_along_edges(rng):
     for _ in range(10 * ROUNDS):
         stages.add(check(*needles(rng, 12)))
     assert stages["wide"] + stages["exact"] >= 60 * ROUNDS, stages
+
+
+def test_leaning_boxes_that_share_an_axis(rng):
+    """Axes that the frustum has, too, stand for others only where these are the same lines."""
+    outside, stages = 0, Stages()
+    for _ in range(8 * ROUNDS):
+        answer = check(*leaning(rng, 12))
+        outside += np.count_nonzero(answer.state == CullState.OUTSIDE)
+        stages.add(answer)
+    assert 20 * ROUNDS <= outside <= 76 * ROUNDS and stages["wide"] >= ROUNDS, (outside, stages)
 
 
 @pytest.mark.parametrize("name", SCENES)

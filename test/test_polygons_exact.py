@@ -333,6 +333,34 @@ def test_mixed_magnitudes(rng):
         check_contact(contacts([scene]), 0, scene)
 
 
+def on_a_line(rng, where):
+    """Triangles above and below a line through the origin; a corner of the lower one is exactly on it.
+
+    Numbers along the line have 26 bits or so, 2^54 times larger at one end than at the other: their differences have
+    about 100 bits, and the products of these no longer fit into double-double.
+    """
+    step = np.array([3.0, 5.0]) if rng.random() < 0.5 else np.array([7.0, 11.0])
+    small, middle, large = (float(rng.integers(2**45, 2**46)) * scale for scale in (2.0**-54, 2.0**-27, 1.0))
+    first, corner, last = sorted((small, middle, large)) if where == "inside" else (middle, small, large)
+    up = np.array([-step[1], step[0]]) * large
+    return (
+        [tuple(first * step), tuple(last * step), tuple(last * step + up)],
+        (1.0, 0.25),
+        [tuple(corner * step), tuple(last * step - 2 * up), tuple(2 * last * step - up)],
+        (0.0, 0.0),
+        INF,
+    )
+
+
+@pytest.mark.parametrize("where", ["inside", "before"])
+def test_products_beyond_double_double(rng, where):
+    """Three points on a line, known to be on it by exact sums alone."""
+    scenes = [on_a_line(rng, where) for _ in range(100)]
+    answer = contacts(scenes)
+    found = Counter(check_contact(answer, i, scene).status for i, scene in enumerate(scenes))
+    assert found["TOUCHING" if where == "inside" else "WILL_TOUCH"] > 90, found
+
+
 def test_differences_beyond_the_doubles():
     big = 1.7e308
     a = [(-big, 0.0), (-big / 2, 0.0), (-big / 2, big / 4), (-big, big / 4)]
