@@ -25,6 +25,7 @@ _PointDistances = tuple[_F, _F, _F, _U | None, _F | None, NDArray[np.int32] | No
 
 def first_nonfinite(values: _F) -> int: ...
 def first_skewed(matrices: _F, limit: float) -> tuple[int, float]: ...
+def rotation_matrices(quaternions: _F) -> _F: ...
 def unit_quaternions(poses: _F, limit: float) -> tuple[_F, int, float]: ...
 def check_rings(vertices: _F, offsets: _I) -> tuple[int, int, str]: ...
 
@@ -123,5 +124,27 @@ def distance_placed(
     accuracy: str = "float64",
     frusta: _F | None = None,
 ) -> _Distances: ...
+def placed_boxes(
+    poses: _F,
+    rotations: _F,
+    uncertainty: _F,
+    shape: _I,
+    center: _F,
+    half: _F,
+    round: _F,
+    rounding: float,
+    underflow: float,
+) -> tuple[_F, _F]: ...
+def swept_boxes(
+    lower: _F,
+    upper: _F,
+    poses: _F,
+    twists: _F,
+    turns: _B,
+    reach: _F,
+    drift: _F,
+    horizon: float,
+    rounding: float,
+) -> tuple[_F, _F]: ...
 def overlapping_pairs(lower: _F, upper: _F) -> _I: ...
 def overlapping_pairs_between(lower_a: _F, upper_a: _F, lower_b: _F, upper_b: _F) -> _I: ...

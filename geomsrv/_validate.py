@@ -163,13 +163,7 @@ def poses(value: Any, name: str = "poses") -> NDArray[np.float64]:
 
 def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, 4) unit x y z w -> (n, 3, 3) rotation matrices R, v_world = R v_body."""
-    x, y, z, w = quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return _core.rotation_matrices(np.ascontiguousarray(quaternions, np.float64))
 
 
 def common_length(a: int, b: int) -> int:

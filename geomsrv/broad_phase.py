@@ -73,15 +73,17 @@ class Candidates:
 def boxes_now(world: World) -> Aabbs:
     """Boxes around every object where it is now, grown by its uncertainty."""
     table, rows = world.table, world.shape
-    turn = world.rotations
-    position = world.poses[:, :3]
-    offset = np.einsum("nij,nj->ni", turn, table.center[rows])
-    half = np.einsum("nij,nj->ni", np.abs(turn), table.half[rows])
-    half += (table.round[rows] + world.uncertainty)[:, None]
-    reach = np.einsum("nij,nj->ni", np.abs(turn), np.abs(table.center[rows]))
-    half += AABB_ROUNDING * (np.abs(position) + reach + half) + UNDERFLOW
-    center = position + offset
-    lower, upper = center - half, center + half
+    lower, upper = _core.placed_boxes(
+        world.poses,
+        world.rotations,
+        world.uncertainty,
+        rows,
+        table.center,
+        table.half,
+        table.round,
+        AABB_ROUNDING,
+        UNDERFLOW,
+    )
     for i in np.flatnonzero(table.unbounded[rows]):
         lower[i], upper[i] = _half_space_box(world, int(i))
     return Aabbs(lower, upper)
@@ -112,29 +114,19 @@ def boxes_swept(world: World, horizon: float) -> Aabbs:
     now = boxes_now(world)
     if horizon == 0.0:
         return now
-    lower, upper = now.lower, now.upper
-    turning = np.flatnonzero(world.turns)
-    if len(turning):
-        # However it turns about its origin, it stays in the ball around it.
-        position = world.poses[turning, :3]
-        reach = world.table.reach[world.shape[turning]] + world.uncertainty[turning]
-        margin = (reach * (1.0 + AABB_ROUNDING))[:, None] + AABB_ROUNDING * np.abs(position)
-        lower[turning], upper[turning] = position - margin, position + margin
-    drift = world.velocity_uncertainty
-    if drift.any():
-        grow = np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)[:, None]
-        lower, upper = np.nextafter(lower - grow, -np.inf), np.nextafter(upper + grow, np.inf)
-    moving = np.flatnonzero(world.moves)
-    if len(moving):
-        speed = world.twists[moving, :3]
-        path = np.multiply(speed, horizon, out=np.zeros_like(speed), where=speed != 0.0)
-        # One rounding for the product, one for the sum.
-        low, high = lower[moving], upper[moving]
-        slack = 4.0 * ROUNDOFF * np.where(np.isfinite(path), np.abs(path), 0.0)
-        with np.errstate(invalid="ignore"):
-            # -inf + inf: a half space that moves for ever; fmin and fmax keep the end that is known.
-            lower[moving] = np.fmin(low, np.nextafter(low - slack + path, -np.inf))
-            upper[moving] = np.fmax(high, np.nextafter(high + slack + path, np.inf))
+    # However an object turns about its origin, it stays in the ball around it.
+    reach = world.table.reach[world.shape] + world.uncertainty
+    lower, upper = _core.swept_boxes(
+        now.lower,
+        now.upper,
+        world.poses,
+        world.twists,
+        world.turns,
+        reach,
+        world.velocity_uncertainty,
+        horizon,
+        AABB_ROUNDING,
+    )
     lost = list(world.motion_faults)
     lower[lost], upper[lost] = -np.inf, np.inf
     return Aabbs(lower, upper)

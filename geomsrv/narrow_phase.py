@@ -288,7 +288,9 @@ def first_contact_rows(
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     planar = world.planar[pairs[:, 0]]
     # Whatever turns, or moves in a way that nobody knows, is still where it is at the start.
-    turning = world.turns[pairs].any(axis=1) & (horizon > 0.0)
+    turning = np.zeros(len(pairs), dtype=bool)
+    if horizon > 0.0 and world.turns.any():
+        turning = world.turns[pairs].any(axis=1)
     moving = ~planar & ~turning & (horizon > 0.0) & followed_solids(world)[pairs].all(axis=1)
     moving &= world.velocity_uncertainty[pairs].any(axis=1) | _relative_velocity(world, pairs, 3).any(axis=1)
     sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar & ~moving]
@@ -317,6 +319,9 @@ def _sliding(
     world: World, pairs: IntArray, kernel: _Kernel, horizon: float, tier: str, counts: Counter[str]
 ) -> ContactRows:
     """Bodies in translation: what the engine answers, and what their uncertainty makes of it."""
+    if not (world.uncertainty.any() or world.velocity_uncertainty.any()):
+        rows = kernel(world, pairs, world.twists, horizon, tier, counts)
+        return rows.take(rows.status != ContactStatus.NEVER)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     # A velocity that is off displaces by no more than this until the end of the time looked at.
     drift = world.velocity_uncertainty[pairs].sum(axis=1)
@@ -362,11 +367,7 @@ def polygon_contacts(
         *rings, velocity_a, velocity_b, horizon, True, tier
     )
     count_rungs(tier, rungs, counts)
-    sets = np.empty(len(pairs), dtype=object)
-    space = _in_space(points)
-    for k in np.flatnonzero(np.diff(offsets)).tolist():
-        sets[k] = space[offsets[k] : offsets[k + 1]]
-    return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets)
+    return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), _sets(_in_space(points), offsets))
 
 
 def followed_solids(world: World) -> BoolArray:
@@ -383,19 +384,24 @@ def solid_contacts(
 ) -> ContactRows:
     """The engine's answer for boxes and hulls with the given velocities; there is no kernel in single precision."""
     tier = tier if tier in SOLID_MOTION_TIERS else "float64"
-    count = len(pairs)
-    status, normal, points = np.zeros(count, np.uint8), np.zeros((count, 3)), np.empty(count, dtype=object)
-    time, lower, upper, last = (np.zeros(count) for _ in range(4))
+    answered = [ContactRows.silent(_NO_PAIRS)]
     for part, side_a, side_b in _by_kind(world, pairs):
-        velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[part, k], :3]) for k in range(2))
-        found = _core.first_contact_world(side_a, side_b, velocity_a, velocity_b, horizon, True, tier)
-        count_rungs(tier, found[-1], counts)
-        status[part], normal[part], sets, offsets = found[0], found[5], found[6], found[7]
-        time[part], lower[part], upper[part], last[part] = found[1:5]
-        for k, row in enumerate(np.flatnonzero(part).tolist()):
-            if offsets[k] < offsets[k + 1]:
-                points[row] = sets[offsets[k] : offsets[k + 1]]
-    return ContactRows(pairs, status, time, lower, upper, last, normal, points)
+        here = pairs[part]
+        velocity_a, velocity_b = (np.ascontiguousarray(velocities[here[:, k], :3]) for k in range(2))
+        status, time, lower, upper, last, normal, points, offsets, *_, rungs = _core.first_contact_world(
+            side_a, side_b, velocity_a, velocity_b, horizon, True, tier
+        )
+        count_rungs(tier, rungs, counts)
+        answered.append(ContactRows(here, status, time, lower, upper, last, normal, _sets(points, offsets)))
+    return ContactRows.joined(answered)
+
+
+def _sets(points: FloatArray, offsets: IntArray) -> NDArray[np.object_]:
+    """(k,) the contact set of every row, or None."""
+    sets = np.empty(len(offsets) - 1, dtype=object)
+    for k in np.flatnonzero(np.diff(offsets)).tolist():
+        sets[k] = points[offsets[k] : offsets[k + 1]]
+    return sets
 
 
 _Side = tuple[Any, ...]

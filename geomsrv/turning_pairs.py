@@ -42,9 +42,12 @@ def contact_rows(
     world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
+    straight = not world.turns.any() and bool((world.planar | followed_solids(world)).all())
+    if tier != "float64" or horizon == 0.0 or straight:
+        return first_contact_rows(world, pairs, horizon, tier, counts)
     turns = world.turns[pairs].any(axis=1)
-    followed = (turns | _rolling(world, pairs)) & followed_in_turning(world)[pairs].all(axis=1) & (horizon > 0.0)
-    if tier != "float64" or not followed.any():
+    followed = (turns | _rolling(world, pairs)) & followed_in_turning(world)[pairs].all(axis=1)
+    if not followed.any():
         return first_contact_rows(world, pairs, horizon, tier, counts)
     count_kinds(world, pairs[followed], counts)
     if (rotating := followed & turns).any():

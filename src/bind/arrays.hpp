@@ -31,12 +31,14 @@ using Values = Input<double, nb::ndim<1>>;
 using Rows2 = Input<double, nb::shape<-1, 2>>;
 using Rows3 = Input<double, nb::shape<-1, 3>>;
 using Rows4 = Input<double, nb::shape<-1, 4>>;
+using Rows6 = Input<double, nb::shape<-1, 6>>;
 using Rows7 = Input<double, nb::shape<-1, 7>>;
 using Rows18 = Input<double, nb::shape<-1, 18>>;
 using Matrices3 = Input<double, nb::shape<-1, 3, 3>>;
 using Offsets = Input<std::int64_t, nb::ndim<1>>;
 using Pairs = Input<std::int64_t, nb::shape<-1, 2>>;
 using Codes = Input<std::uint8_t, nb::ndim<1>>;
+using Flags = Input<bool, nb::ndim<1>>;
 
 /// As `Frustum.packed` lists it.
 inline Frustum unpacked_frustum(const double* p) {

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geom/broad_phase.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
+#include "geom/bounding_box.hpp"
 
 namespace geomsrv::bind {
 
@@ -45,9 +47,72 @@ nb::object answer(const Search& search) {
     return to_array(pairs);
 }
 
+/// Where boxes are written, row by row.
+struct BoxRows {
+    Output<double> lower, upper;
+
+    explicit BoxRows(std::size_t count)
+        : lower(empty<double>({count, 3})), upper(empty<double>({count, 3})) {}
+    void put(std::size_t i, const Aabb& box) const {
+        std::copy_n(box.lower, 3, lower.data + 3 * i);
+        std::copy_n(box.upper, 3, upper.data + 3 * i);
+    }
+    [[nodiscard]] nb::tuple pair() const { return nb::make_tuple(lower.array, upper.array); }
+};
+
+/// Of objects that have row `shape` of a table of bounds.
+nb::tuple placed_boxes(const Rows7& poses, const Matrices3& rotations, const Values& uncertainty,
+                       const Offsets& shape, const Rows3& center, const Rows3& half, const Values& round,
+                       double rounding, double underflow) {
+    const std::size_t count = poses.shape(0);
+    if (rotations.shape(0) != count || uncertainty.shape(0) != count || shape.shape(0) != count) {
+        throw std::invalid_argument("placed_boxes: one row of each for an object");
+    }
+    const BoxRows out(count);
+    const nb::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto row = static_cast<std::size_t>(shape.data()[i]);
+        const ShapeBounds bounds{center.data() + 3 * row, half.data() + 3 * row, round.data()[row]};
+        out.put(i, placed_box(bounds, rotations.data() + 9 * i, poses.data() + 7 * i, uncertainty.data()[i],
+                              rounding, underflow));
+    }
+    const nb::gil_scoped_acquire locked;
+    return out.pair();
+}
+
+nb::tuple swept_boxes(const Rows3& lower, const Rows3& upper, const Rows7& poses, const Rows6& twists,
+                      const Flags& turns, const Values& reach, const Values& drift, double horizon,
+                      double rounding) {
+    const std::size_t count = poses.shape(0);
+    for (const std::size_t size :
+         {lower.shape(0), upper.shape(0), twists.shape(0), turns.shape(0), reach.shape(0), drift.shape(0)}) {
+        if (size != count) throw std::invalid_argument("swept_boxes: one row of each for an object");
+    }
+    const BoxRows out(count);
+    const nb::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < count; ++i) {
+        Aabb box;
+        std::copy_n(lower.data() + 3 * i, 3, box.lower);
+        std::copy_n(upper.data() + 3 * i, 3, box.upper);
+        const Sweep sweep{poses.data() + 7 * i, twists.data() + 6 * i, turns.data()[i], reach.data()[i],
+                          drift.data()[i]};
+        out.put(i, swept_box(box, sweep, horizon, rounding));
+    }
+    const nb::gil_scoped_acquire locked;
+    return out.pair();
+}
+
 }  // namespace
 
 void define_broad_phase(nb::module_& m) {
+    m.def("placed_boxes", placed_boxes, nb::arg("poses").noconvert(), nb::arg("rotations").noconvert(),
+          nb::arg("uncertainty").noconvert(), nb::arg("shape").noconvert(), nb::arg("center").noconvert(),
+          nb::arg("half").noconvert(), nb::arg("round").noconvert(), nb::arg("rounding"),
+          nb::arg("underflow"));
+    m.def("swept_boxes", swept_boxes, nb::arg("lower").noconvert(), nb::arg("upper").noconvert(),
+          nb::arg("poses").noconvert(), nb::arg("twists").noconvert(), nb::arg("turns").noconvert(),
+          nb::arg("reach").noconvert(), nb::arg("drift").noconvert(), nb::arg("horizon"),
+          nb::arg("rounding"));
     m.def(
         "overlapping_pairs",
         [](const Rows3& lower, const Rows3& upper) {

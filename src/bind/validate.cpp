@@ -7,6 +7,7 @@
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
+#include "geom/shape.hpp"
 
 namespace geomsrv::bind {
 
@@ -82,6 +83,24 @@ nb::tuple unit_quaternions(const Rows7& poses, double limit) {
     return nb::make_tuple(out.array, -1, 1.0);
 }
 
+/// (n, 3, 3) of unit quaternions x y z w: from here on the numbers are taken literally.
+nb::object rotation_matrices(const Rows4& quaternions) {
+    const std::size_t count = quaternions.shape(0);
+    const Output<double> out = empty<double>({count, 3, 3});
+    for (std::size_t i = 0; i < count; ++i) {
+        const double* const q = quaternions.data() + 4 * i;
+        const Mat3 rotation = rotation_of(q[0], q[1], q[2], q[3]);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3 row = rotation.row[k];
+            double* const to = out.data + 9 * i + 3 * k;
+            to[0] = row.x;
+            to[1] = row.y;
+            to[2] = row.z;
+        }
+    }
+    return out.array;
+}
+
 }  // namespace
 
 void define_validate(nb::module_& m) {
@@ -93,6 +112,7 @@ void define_validate(nb::module_& m) {
         },
         nb::arg("values").noconvert());
     m.def("first_skewed", first_skewed, nb::arg("matrices").noconvert(), nb::arg("limit"));
+    m.def("rotation_matrices", rotation_matrices, nb::arg("quaternions").noconvert());
     m.def("unit_quaternions", unit_quaternions, nb::arg("poses").noconvert(), nb::arg("limit"));
 }
 

@@ -46,8 +46,7 @@ struct ShapeView {
     const Frustum* frustum = nullptr;    ///< of which `vertices` are the eight corners, rounded
 };
 
-/// Rotation of the unit quaternion x y z w, rounded exactly as geomsrv._validate.rotation_matrices rounds it:
-/// from there on the nine numbers are taken literally.
+/// Rotation of the unit quaternion x y z w, rounded: from there on the nine numbers are taken literally.
 constexpr Mat3 rotation_of(double x, double y, double z, double w) {
     return {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
              {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
