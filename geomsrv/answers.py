@@ -281,6 +281,9 @@ class FirstContacts(_Certified):
         Contact set of item i: ``points[point_offsets[i]:point_offsets[i + 1]]``, one point, the two ends of a segment,
         or the counter-clockwise intersection polygon of polygons that overlap at the start.  Of solids also a polygon,
         counter-clockwise about the normal, or the vertices of what they share if they overlap at the start.
+    part_offsets : (m + 1,) int64
+        Parts of contact sets, of which bodies that are not convex have several: part k, one of these points, segments
+        or polygons, is ``points[part_offsets[k]:part_offsets[k + 1]]``.
     certain : (n,) bool
         True where exact arithmetic is proven to give the same ``status``.
     message : str
@@ -300,6 +303,19 @@ class FirstContacts(_Certified):
     _closing_speed: FloatArray | Callable[[], FloatArray] = field(repr=False)
     cost: Cost
     message: str = ""
+    _part_offsets: IntArray | None = field(default=None, repr=False, kw_only=True)
+
+    @cached_property
+    def part_offsets(self) -> IntArray:
+        """See above; of convex bodies what is not empty of `point_offsets`."""
+        return np.unique(self.point_offsets) if self._part_offsets is None else self._part_offsets
+
+    def parts(self, i: int) -> list[FloatArray]:
+        """Contact set of item i, part by part, (m, d) each."""
+        row = range(len(self.status))[i]
+        ends = self.part_offsets
+        first, last = np.searchsorted(ends, self.point_offsets[[row, row + 1]])
+        return [self.points[j:k] for j, k in zip(ends[first:last], ends[first + 1 : last + 1], strict=True)]
 
     @cached_property
     def closing_speed(self) -> FloatArray:

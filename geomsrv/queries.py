@@ -219,8 +219,8 @@ def first_contact(
     Parameters
     ----------
     a, b : Polygons (2D), Polytopes or Boxes (3D)
-        n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another;
-        only without a contact set, and piece by piece, so at the cost of all pairs of pieces.
+        n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another,
+        at the cost of all pairs of pieces.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
@@ -252,6 +252,11 @@ def first_contact(
     FirstContacts
         ``cost.counts``: polygons by the tier's rungs; solids decided by the "filter" in float64, in "wide" arithmetic
         (double-double) and in "exact" arithmetic, which "float64", too, turns to where bodies pass within the slack.
+
+        Of a Region ``parts`` lists what may be several points and segments, no seam among them; bodies that overlap at
+        the start share convex polygons, one for each pair of pieces.  ``normal`` parts the bodies near all points of
+        contact, and is NaN where no one normal does, as in a notch; ``last_time`` is the last of all contacts, between
+        which they may be apart.
 
         If anything turns, ``time`` is ``time_lower``: the bodies are proven apart before it, and proven in contact at
         some time until ``time_upper``.  ``normal``, ``closing_speed``, and one contact point midway between the nearest

@@ -18,7 +18,22 @@ from numpy.typing import ArrayLike
 from geomsrv import _validate
 from geomsrv.answers import Booleans, ContactStatus, Cost, Distances, FirstContacts
 from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.region_contact import (
+    Moving,
+    Part,
+    Vector,
+    begin,
+    common_normal,
+    common_parts,
+    convex,
+    exactly,
+    inside_parts,
+    nearest,
+    rounded,
+    united,
+)
 from geomsrv.shapes import FloatArray, Polygons, frozen
+from geomsrv.turning import turns
 
 __all__ = ["Region", "distance_regions", "first_contact_regions", "intersects_regions"]
 
@@ -104,14 +119,13 @@ def first_contact_regions(
     """The answer of `first_contact`, which is passed in, where a or b is a region: the first of all pairs of pieces."""
     start = time.perf_counter_ns()
     count = _common(a, b)
-    if options["contact_set"]:
-        raise NotAvailableError("the contact set of a Region is not available yet: pass contact_set=False")
     if options["certificates"]:
         raise NotAvailableError("certificates of a Region are not available yet")
+    wanted, options = options["contact_set"], {**options, "contact_set": True}
     for center, body in (("center_a", a), ("center_b", b)):
         if isinstance(body, Region) and options[center] is None:
             # All pieces turn about one point.
-            options = {**options, center: 0.5 * body.outline.min(axis=0) + 0.5 * body.outline.max(axis=0)}
+            options[center] = 0.5 * body.outline.min(axis=0) + 0.5 * body.outline.max(axis=0)
     found = [ask(one, two, *velocities, **options) for one, two in _pairs(a, b)]
     status, lower, upper, last, certain, middle = (
         np.array([getattr(answer, name) for answer in found])
@@ -122,23 +136,125 @@ def first_contact_regions(
     outcome, low, high = status[first, every], lower[first, every], np.fmin.reduce(upper, axis=0)
     outcome[(outcome == ContactStatus.GRAZING) & (high - low <= options["tolerance"])] = ContactStatus.WILL_TOUCH
     overlap = status == ContactStatus.OVERLAPPING
-    outcome[overlap.any(axis=0)] = ContactStatus.OVERLAPPING
-    # Bodies that touch two pieces may be thin ones on a seam, which is inside.
-    seam = (outcome == ContactStatus.TOUCHING) & ((status == ContactStatus.TOUCHING).sum(axis=0) > 1)
-    sure = (certain.all(axis=0) & ~seam) | (overlap & certain).any(axis=0)
+    for at_once in (
+        ContactStatus.TOUCHING,
+        ContactStatus.OVERLAPPING,
+    ):  # even if others do so too soon to be told apart
+        outcome[(status == at_once).any(axis=0)] = at_once
+    normal = np.array([answer.normal for answer in found])[first, every]
+    sure = certain.all(axis=0) | (overlap & certain).any(axis=0)
+    ways = _rows(velocities, count)
+    turning = turns(options["angular_velocity_a"], options["angular_velocity_b"])
+    sets: list[list[FloatArray]] = [[] for _ in every]
+    for i in np.flatnonzero(outcome != ContactStatus.NEVER).tolist():
+        pieces = [found[k] for k in np.flatnonzero(lower[:, i] <= high[i])]
+        bodies = _moving(a, i, ways[0][i]), _moving(b, i, ways[1][i])
+        if outcome[i] == ContactStatus.TOUCHING and any(body.thin for body in bodies) and _inside(bodies)[1]:
+            # On a seam, which is inside.
+            outcome[i], sure[i] = ContactStatus.OVERLAPPING, True
+        if turning or found[0].cost.accuracy == "bound":
+            sets[i] = found[first[i]].parts(i)
+        elif outcome[i] == ContactStatus.OVERLAPPING:
+            normal[i], sets[i] = np.nan, _shared(bodies, pieces, i)
+        else:
+            sets[i], normal[i] = _contact(bodies, pieces, i, (low[i], high[i]))
+    points = [part for parts in sets for part in parts] if wanted else []
+    ends = np.cumsum([0, *map(len, points)], dtype=np.int64)
+    items = np.cumsum([0, *map(len, sets)]) if wanted else np.zeros(count + 1, np.int64)
+    speeds = np.array([answer.closing_speed for answer in found])[first, every] if turning else _approach(ways, normal)
     return FirstContacts(
         status=outcome,
-        time=np.clip(middle[first, every], low, high),
+        time=np.clip(np.fmin.reduce(middle, axis=0), low, high),
         time_lower=low,
         time_upper=high,
         last_time=np.fmax.reduce(last, axis=0),
-        normal=np.array([answer.normal for answer in found])[first, every],
-        points=np.zeros((0, 2)),
-        point_offsets=np.zeros(count + 1, np.int64),
+        normal=normal,
+        points=np.concatenate([np.zeros((0, 2)), *points]),
+        point_offsets=ends[items],
         certain=sure,
-        _closing_speed=lambda: np.array([answer.closing_speed for answer in found])[first, every],
+        _closing_speed=speeds,
         cost=_cost(found, start),
+        _part_offsets=ends,
     )
+
+
+# A contact point found twice, from two pieces: a vertex moved by a product and a sum, up to the slack within which
+# polygons of such coordinates touch; some 20 roundings of their size, rounded up.
+PLACE_ROUNDING = 64.0 * 2.0**-53
+SINGLE_PLACE_ROUNDING = 64.0 * 2.0**-24  # the same in float32
+
+
+def _contact(
+    bodies: tuple[Moving, Moving], pieces: list[FirstContacts], i: int, span: tuple[float, float]
+) -> tuple[list[FloatArray], FloatArray]:
+    """Contact set and normal of bodies that touch, from the pairs of pieces that do so first."""
+    a, b = bodies
+    if pieces[0].cost.accuracy == "exact":
+        slack = Fraction(0)
+        begun = begin(a, b, *span)
+        assert begun is not None, "an edge touches first"
+        moment, near = begun
+        shares = common_parts(near, *((moment * x, moment * y) for x, y in (a.velocity, b.velocity)))
+    else:
+        times = [piece.time[i] for piece in pieces]
+        moment = Fraction(min(times))
+        parts = [part for piece in pieces for part in piece.parts(i)]
+        shares = [exactly(part) for part in parts]
+        size = max(float(np.abs(part).max()) for part in parts)
+        size = max(size, *(float(abs(x)) for body in bodies for v in body.rings[0] for x in v))
+        speed = max(abs(x) for body in bodies for x in body.velocity)
+        rounding = SINGLE_PLACE_ROUNDING if pieces[0].cost.accuracy == "float32" else PLACE_ROUNDING
+        slack = Fraction(rounding * size) + speed * (Fraction(max(times)) - moment)
+    shares = united(shares, slack)
+    normal = common_normal(shares, a.moved(moment), b.moved(moment), slack)
+    unit = np.full(2, np.nan) if normal is None else np.array(rounded(normal))
+    return _arrays(shares, normal), unit
+
+
+def _shared(bodies: tuple[Moving, Moving], pieces: list[FirstContacts], i: int) -> list[FloatArray]:
+    """What bodies have in common that overlap at the start: convex polygons, or parts of a segment."""
+    if pieces[0].cost.accuracy == "exact" and any(body.thin for body in bodies):
+        return _arrays(_inside(bodies)[0], None)
+    parts = [part for piece in pieces for part in piece.parts(i)]
+    areas = [part for part in parts if len(part) > 2]
+    if areas:
+        return areas
+    size = max(float(np.abs(part).max()) for part in parts)
+    return _arrays(united([exactly(part) for part in parts], Fraction(PLACE_ROUNDING * size)), None)
+
+
+def _inside(bodies: tuple[Moving, Moving]) -> tuple[list[Part], bool]:
+    thin, body = sorted(bodies, key=lambda body: not body.thin)
+    return inside_parts(body, thin)
+
+
+def _arrays(parts: list[Part], normal: Vector | None) -> list[FloatArray]:
+    """As numbers; the ends of a segment in the order that `first_contact` has."""
+    x, y = normal or (Fraction(0), Fraction(-1))
+    ordered = (sorted(part, key=lambda p: p[1] * x - p[0] * y) for part in parts)
+    return [np.array([[nearest(u), nearest(v)] for u, v in part]) for part in ordered]
+
+
+def _moving(body: Region | Polygons, i: int, velocity: FloatArray) -> Moving:
+    """Item i, or the only one."""
+    if isinstance(body, Region):
+        rings = tuple(tuple((Fraction(x, body._unit), Fraction(y, body._unit)) for x, y in r) for r in body._whole)
+        return Moving(rings, exactly(velocity[None])[0])
+    return convex(body[i if len(body) > 1 else 0], velocity)
+
+
+def _rows(velocities: tuple[Any, Any], count: int) -> tuple[FloatArray, FloatArray]:
+    """Velocities that have been checked, a row for every item."""
+    one, two = (np.broadcast_to(np.asarray(v, np.float64), (count, 2)) for v in velocities)
+    return one, two
+
+
+def _approach(ways: tuple[FloatArray, FloatArray], normal: FloatArray) -> Callable[[], FloatArray]:
+    def speed() -> FloatArray:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return -((ways[1] - ways[0]) * normal).sum(axis=1)
+
+    return speed
 
 
 def distance_regions(ask: Callable[..., Distances], a: Any, b: Any, want: Any, options: dict[str, Any]) -> Distances:

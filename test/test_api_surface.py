@@ -68,8 +68,8 @@ ATTRIBUTES = {
     "Cull": "state certain cost certificates",
     "Distances": "distance lower upper point_a point_b normal status region cost certificates",
     "Booleans": "value certain status cost certificates",
-    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets certain closing_speed "
-    "cost certificates",
+    "FirstContacts": "status time time_lower time_upper last_time normal points point_offsets part_offsets certain "
+    "closing_speed cost certificates",
     "CollisionTimes": "status time time_lower time_upper certain first earliest earliest_upper cost",
     "Cost": "elapsed_ns accuracy counts",
     "SceneObject": "id shape pose twist frame",

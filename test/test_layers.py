@@ -36,8 +36,8 @@ PYTHON_LAYERS = {
     "package": ("geomsrv/__init__.py", ()),
     "scene": ("geomsrv/*.py", ("numpy",)),
     "query": (
-        "geomsrv/queries.py geomsrv/turning.py geomsrv/footprint.py geomsrv/region.py geomsrv/shapes.py "
-        "geomsrv/answers.py geomsrv/_validate.py geomsrv/errors.py "
+        "geomsrv/queries.py geomsrv/turning.py geomsrv/footprint.py geomsrv/region.py geomsrv/region_contact.py "
+        "geomsrv/shapes.py geomsrv/answers.py geomsrv/_validate.py geomsrv/errors.py "
         "geomsrv/certificates.py geomsrv/evidence.py geomsrv/verify.py geomsrv/_version.py",
         ("numpy",),
     ),
