@@ -15,7 +15,7 @@ from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
 from geomsrv.world import ROUNDOFF, UNDERFLOW, World
 
-__all__ = ["Aabbs", "Candidates", "Selection", "boxes_now", "boxes_swept", "candidates", "gaps"]
+__all__ = ["Aabbs", "Candidates", "Selection", "boxes_now", "boxes_swept", "candidates", "entry_times", "gaps"]
 
 # A face of a box is computed as ((R c) + p) +- ((|R| h) + round): a sum of at most six terms, each a product
 # of a rounded and a given number.  With the rounding of c and h themselves (2 u) its error stays below 8 u
@@ -27,6 +27,10 @@ AABB_ROUNDING = 32.0 * ROUNDOFF
 # The square of a box distance is compared with the square of a limit: 3 squares, 3 differences and 2 sums,
 # less than 8 roundings on either side.
 GAP_ROUNDING = 16.0 * ROUNDOFF
+
+# A gap between boxes and a closing speed are differences of two numbers each, less a margin or plus a drift: 3
+# roundings relative to their magnitudes; their quotient adds one.
+ENTRY_ROUNDING = 8.0 * ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +115,12 @@ def _half_space_box(world: World, row: int) -> tuple[FloatArray, FloatArray]:
 
 def boxes_swept(world: World, horizon: float) -> Aabbs:
     """Boxes around all that every object passes through within the next `horizon` seconds."""
+    return _swept(world, horizon) if horizon > 0.0 else boxes_now(world)
+
+
+def _swept(world: World, horizon: float) -> Aabbs:
+    """The same; for no time at all boxes that hold an object however it is turned."""
     now = boxes_now(world)
-    if horizon == 0.0:
-        return now
     # However an object turns about its origin, it stays in the ball around it.
     reach = world.table.reach[world.shape] + world.uncertainty
     lower, upper = _core.swept_boxes(
@@ -130,6 +137,24 @@ def boxes_swept(world: World, horizon: float) -> Aabbs:
     lost = list(world.motion_faults)
     lower[lost], upper[lost] = -np.inf, np.inf
     return Aabbs(lower, upper)
+
+
+def entry_times(world: World, pairs: IntArray, margin: float = 0.0) -> FloatArray:
+    """(k,) [s] until which the boxes of a pair are surely apart by more than the margin along an axis; may be inf."""
+    boxes, (a, b) = _swept(world, 0.0), pairs.T
+    velocity = world.twists[a, :3] - world.twists[b, :3]
+    drift = world.velocity_uncertainty[pairs].sum(axis=1)[:, None]
+    begin = np.zeros(len(pairs))
+    for gap, closing in (
+        (boxes.lower[b] - boxes.upper[a], velocity + drift),
+        (boxes.lower[a] - boxes.upper[b], drift - velocity),
+    ):
+        closing += ENTRY_ROUNDING * (np.abs(world.twists[a, :3]) + np.abs(world.twists[b, :3]) + drift)
+        room = gap - margin - ENTRY_ROUNDING * (np.abs(boxes.lower[a]) + np.abs(boxes.lower[b]) + np.abs(gap) + margin)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            wait = np.where(closing > 0.0, room / closing * (1.0 - ENTRY_ROUNDING), np.inf)
+        begin = np.maximum(begin, np.where(room > 0.0, wait, 0.0).max(axis=1))
+    return begin
 
 
 def gaps(boxes: Aabbs, pairs: IntArray) -> FloatArray:

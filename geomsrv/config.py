@@ -141,6 +141,16 @@ class Config:
     )
     effects_contact_set: bool = _setting(True, "effects.contact_set", "Allow the points of contact.")
     effects_markers: bool = _setting(True, "effects.markers", "Publish ~/markers.")
+    contacts_margin: float = _setting(
+        0.0,
+        "contacts.margin",
+        "Pairs on ~/contacts are in contact when they come as near as this; above 0 at accuracy float64 only.",
+        unit="m",
+        minimum=0.0,
+    )
+    contacts_earliest: bool = _setting(
+        False, "contacts.earliest", "List on ~/contacts only the pair that is first in contact."
+    )
     camera_frame: str = _setting(
         "",
         "camera.frame",
@@ -187,6 +197,8 @@ class Config:
             if fault:
                 raise GeometryError(fault)
         _validate.accuracy(self.accuracy, TIERS)
+        if self.contacts_margin > 0.0 and self.accuracy != "float64":
+            raise GeometryError(f"contacts.margin must be 0 at accuracy {self.accuracy}, got {self.contacts_margin:g}")
         if not self.camera_far > self.camera_near:
             raise GeometryError(f"camera.far must be > camera.near = {self.camera_near:g}, got {self.camera_far:g}")
         # Within float32 drift; what is left of it is normalised away.

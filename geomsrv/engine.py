@@ -52,6 +52,8 @@ class SceneContacts:
         Penetration depth of every pair now [m]; NaN where it was not computed.
     horizon : float
         [s]
+    margin : float
+        Pairs that come as near as this are in contact [m].
     checked : int
         Pairs of the scene that are not allowed to touch.
     """
@@ -59,6 +61,7 @@ class SceneContacts:
     pairs: PairContacts
     depth: FloatArray
     horizon: float
+    margin: float
     checked: int
 
 
@@ -254,7 +257,8 @@ class Engine:
         horizon = self.config.horizon if self.config.effects_first_contact else 0.0
         self.counters["first_contact"] += "first_contact" in on
         self.counters["rotation"] += "rotation" in on
-        pairs = self.scene.first_contacts(horizon, accuracy=self.config.accuracy)
+        margin, earliest = self.config.contacts_margin, self.config.contacts_earliest
+        pairs = self.scene.first_contacts(horizon, margin=margin, earliest=earliest, accuracy=self.config.accuracy)
         if "contact_set" in on:
             self.counters["contact_set"] += 1
         else:
@@ -264,7 +268,7 @@ class Engine:
             self.counters["penetration"] += 1
             depth = _depths(pairs, self.scene.contacts(accuracy=self.config.accuracy))
         counts = pairs.cost.counts
-        return SceneContacts(pairs, depth, horizon, counts.get("pairs", 0) - counts.get("allowed", 0))
+        return SceneContacts(pairs, depth, horizon, margin, counts.get("pairs", 0) - counts.get("allowed", 0))
 
     def check(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> None:
         """Hand distances of (n, 2) rows of `world` to the cross-check, if it is on."""

@@ -33,6 +33,7 @@ __all__ = [
     "placed_boxes",
     "placed_distances",
     "placed_hulls",
+    "near_at_rest",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -569,6 +570,32 @@ def _spinning_polygons(
     certain &= tier != "bound"
     rows.upper[~apart & ~certain] = np.inf
     return rows, _unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
+
+
+def near_at_rest(
+    world: World, pairs: IntArray, horizon: float, counts: Counter[str], margin: float
+) -> tuple[ContactRows, Unsupported]:
+    """Pairs that rest relative to each other and are, or may be, no further apart than the margin."""
+    rows, missing = distance_rows(world, pairs, True, "float64", counts)
+    rows = rows.take(rows.lower <= margin)
+    near = rows.distance <= margin
+    status = np.select(
+        [rows.distance < margin, near], [ContactStatus.OVERLAPPING, ContactStatus.TOUCHING], ContactStatus.NEVER
+    )
+    points = np.empty(len(near), dtype=object)
+    for k in np.flatnonzero(near).tolist():
+        points[k] = 0.5 * (rows.point_a[k : k + 1] + rows.point_b[k : k + 1])
+    answered = ContactRows(
+        rows.pairs,
+        status.astype(np.uint8),
+        np.where(near, 0.0, np.nan),
+        np.zeros(len(near)),
+        np.where(rows.upper <= margin, 0.0, np.inf),
+        np.where(near, horizon, np.nan),
+        np.where(near[:, None], rows.normal, np.nan),
+        points,
+    )
+    return answered, missing
 
 
 def _unpredictable(world: World, pairs: Unsupported) -> Unsupported:

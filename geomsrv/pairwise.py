@@ -31,7 +31,7 @@ from geomsrv.narrow_phase import (
 from geomsrv.placement import laid_flat
 from geomsrv.queries import RUNGS, TIERS
 from geomsrv.shapes import Frustum, Shape
-from geomsrv.turning_pairs import contact_rows
+from geomsrv.turning_pairs import closing_speeds, contact_rows, nearness
 from geomsrv.world import ShapeTable, World
 
 __all__ = [
@@ -89,6 +89,8 @@ class ListedContacts:
         As in `PairContacts`; NaN for NEVER and UNSUPPORTED.
     normal : (n, 3) float64
         Fixed frame.
+    closing_speed : (n,) float64
+        As in `PairContacts`.
     points : (k, 3) float64, point_offsets : (n + 1,) int64
         Contact set of pair i: ``points[point_offsets[i]:point_offsets[i + 1]]``, fixed frame.
     message : str
@@ -102,6 +104,7 @@ class ListedContacts:
     time_upper: FloatArray
     last_time: FloatArray
     normal: FloatArray
+    closing_speed: FloatArray
     points: FloatArray
     point_offsets: IntArray
     message: str
@@ -301,16 +304,17 @@ def _reasons(world: World, pairs: IntArray) -> str:
 
 
 def listed_first_contacts(
-    world: World, pairs: IntArray, horizon: float, *, accuracy: str = "float64"
+    world: World, pairs: IntArray, horizon: float, *, margin: float = 0.0, accuracy: str = "float64"
 ) -> ListedContacts:
-    """First contacts within `horizon` [s] of listed pairs, (n, 2) rows of `world`."""
+    """First contacts within `horizon` [s], at a `margin` [m], of listed pairs, (n, 2) rows of `world`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
+    near = nearness(margin, accuracy)
     tier = _validate.accuracy(accuracy, TIERS)
     end = _validate.limit(horizon, "horizon")
-    if _all_slide(world, pairs):
+    if near == 0.0 and _all_slide(world, pairs):
         return _sliding_polygons(world, pairs, end, tier, start)
     listed = _Listed(world, pairs)
-    rows, unsupported = contact_rows(world, listed.comparable, end, tier, counts)
+    rows, unsupported = contact_rows(world, listed.comparable, end, tier, counts, near)
     at = listed.rows_among(rows.pairs)
     # A pair without a row never touches, or could not be compared at all.
     status = _take(rows.status, at, ContactStatus.NEVER)
@@ -328,6 +332,7 @@ def listed_first_contacts(
         time_upper=_take(rows.upper, at, np.nan),
         last_time=_take(rows.last_time, at, np.nan),
         normal=np.where(listed.swapped[:, None], 0.0 - normal, normal),
+        closing_speed=_take(closing_speeds(world, rows), at, np.nan),
         points=np.concatenate([none, *chosen]),
         point_offsets=np.cumsum([0, *map(len, chosen)], dtype=np.int64),
         message=listed.message(unsupported),
@@ -360,6 +365,7 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
         time_upper=rows.upper,
         last_time=rows.last_time,
         normal=rows.normal,
+        closing_speed=closing_speeds(world, rows),
         points=np.concatenate([none, *sets]),
         point_offsets=np.cumsum([0, *map(len, sets)], dtype=np.int64),
         message="",

@@ -30,7 +30,7 @@ from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, sett
 from geomsrv.queries import TIERS
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
-from geomsrv.turning_pairs import contact_rows
+from geomsrv.turning_pairs import closing_speeds, contact_rows, first_contact_row, nearness
 from geomsrv.visibility import Visibility, sight
 from geomsrv.world import ShapeTable, World
 
@@ -195,6 +195,9 @@ class PairContacts(_PairRows):
         Last contact [s], at most the horizon; NaN where no kernel follows the motion.
     normal : (n, 3) float64
         Unit contact normal from a to b at ``time``, fixed frame; NaN where there is none.
+    closing_speed : (n,) float64
+        How fast the bodies approach along the normal at ``time`` [m/s]; < 0 if they part.  Of bodies that turn, at the
+        contact point where it is fastest.  NaN without a normal.
     points : (k, 3) float64, point_offsets : (n + 1,) int64
         Contact set of row i: ``points[point_offsets[i]:point_offsets[i + 1]]``, at ``time``, fixed frame.
     unsupported : list of (str, str, str)
@@ -211,6 +214,7 @@ class PairContacts(_PairRows):
     time_upper: FloatArray
     last_time: FloatArray
     normal: FloatArray
+    closing_speed: FloatArray
     points: FloatArray
     point_offsets: IntArray
 
@@ -528,6 +532,8 @@ class Scene:
         self,
         horizon: float,
         *,
+        margin: float = 0.0,
+        earliest: bool = False,
         ids: Iterable[str] | None = None,
         others: Iterable[str] | None = None,
         accuracy: str = "float64",
@@ -543,6 +549,12 @@ class Scene:
         ----------
         horizon : float
             [s], >= 0; may be inf.
+        margin : float
+            Bodies are in contact that are no further apart than this [m], >= 0: ``time`` is when they have come so
+            near, OVERLAPPING that they are nearer at the start.  Only at tier "float64".
+        earliest : bool
+            Answer only the pair that is first in contact, by ``time`` and then by ids, and what is UNSUPPORTED among
+            the pairs looked at for that: those whose boxes meet later are not (``cost.counts["later"]``).
         ids, others, accuracy
             As for `distances`.
 
@@ -557,12 +569,14 @@ class Scene:
         """
         start = time.perf_counter_ns()
         limit = _validate.limit(horizon, "horizon")
+        near = nearness(margin, accuracy)
         tier = _validate.accuracy(accuracy, TIERS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
-        pairs = _near(world, boxes_swept(world, limit), 0.0, selection, counts)
-        rows, unsupported = contact_rows(world, pairs, limit, tier, counts)
+        pairs = _near(world, boxes_swept(world, limit), near, selection, counts)
+        find = first_contact_row if earliest else contact_rows
+        rows, unsupported = find(world, pairs, limit, tier, counts, near)
         counts["unsupported"] += len(unsupported.pairs)
         sets = [points for points in rows.points if points is not None]
         sizes = [0 if points is None else len(points) for points in rows.points]
@@ -580,6 +594,7 @@ class Scene:
             rows.upper,
             rows.last_time,
             rows.normal,
+            closing_speeds(world, rows),
             np.concatenate([np.zeros((0, 3)), *sets]),
             np.cumsum([0, *sizes], dtype=np.int64),
         )

@@ -14,20 +14,23 @@ from itertools import product
 
 import numpy as np
 
-from geomsrv import _core
+from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
+from geomsrv.broad_phase import entry_times
+from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.narrow_phase import (
     ContactRows,
     Unsupported,
     count_kinds,
     first_contact_rows,
     followed_solids,
+    near_at_rest,
     placed_boxes,
     placed_hulls,
 )
 from geomsrv.world import ROUNDOFF, World, gather
 
-__all__ = ["contact_rows", "followed_in_turning"]
+__all__ = ["closing_speeds", "contact_rows", "first_contact_row", "followed_in_turning", "nearness"]
 
 # Widest time interval of a contact while nothing is uncertain [s].
 TIME_TOLERANCE = 1e-6
@@ -35,13 +38,20 @@ TIME_TOLERANCE = 1e-6
 # The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
 CAPSULE_ROUNDING = 16.0 * ROUNDOFF
 
+NO_APPROACH = "first contact at a distance ({}) is unsupported"
+
 FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, beside polygons
 
 
 def contact_rows(
-    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], margin: float = 0.0
 ) -> tuple[ContactRows, Unsupported]:
-    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
+    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel.
+
+    With a `margin` [m], at tier "float64", bodies are in contact that are no further apart.
+    """
+    if margin > 0.0:
+        return _approaches(world, pairs, horizon, counts, margin)
     straight = not world.turns.any() and bool((world.planar | followed_solids(world)).all())
     if tier != "float64" or horizon == 0.0 or straight:
         return first_contact_rows(world, pairs, horizon, tier, counts)
@@ -54,6 +64,98 @@ def contact_rows(
         counts["rotation"] += int(rotating.sum())
     rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, tier, counts)
     return ContactRows.joined([_turning_contacts(world, pairs[followed], horizon), rows]), unsupported
+
+
+FEW = 64  # pairs that are looked at before it is asked whether others can be earlier; from then on twice as many
+
+
+def first_contact_row(
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], margin: float = 0.0
+) -> tuple[ContactRows, Unsupported]:
+    """As `contact_rows`, but only the row with the least time, and what is unsupported of the pairs looked at.
+
+    Pairs are taken in the order in which their boxes meet, until what is left meets later than contact is proven.
+    """
+    begin = entry_times(world, pairs, margin)
+    order, found, first = (
+        np.argsort(begin, kind="stable"),
+        [(ContactRows.silent(pairs[:0]), Unsupported.none())],
+        np.inf,
+    )
+    done, size = 0, FEW
+    while done < len(order) and begin[order[done]] <= first + TIME_TOLERANCE:
+        chosen = np.sort(order[done : done + size])
+        found.append(contact_rows(world, pairs[chosen], horizon, tier, counts, margin))
+        first = min(first, np.fmin.reduce(found[-1][0].upper, initial=np.inf))
+        done, size = done + len(chosen), 2 * size
+    counts["later"] += len(order) - done
+    rows = ContactRows.joined([part for part, _ in found])
+    silent = rows.status == ContactStatus.UNSUPPORTED
+    when = np.where(np.isnan(rows.time), np.inf, rows.time)
+    if len(when) and (when < np.inf).any():
+        silent[np.argmin(when)] = True
+    return rows.take(silent), Unsupported.joined([part for _, part in found])
+
+
+def nearness(margin: float, accuracy: str) -> float:
+    """A margin, checked.
+
+    Raises
+    ------
+    GeometryError
+        Names the argument and the fault; `NotAvailableError` for a margin at a tier that does not know any.
+    """
+    near = _validate.scalar(margin, "margin")
+    if near < 0.0:
+        raise GeometryError(f"margin must be >= 0, got {margin}")
+    if near > 0.0 and accuracy != "float64":
+        raise NotAvailableError(f"a margin is available at accuracy 'float64' only, not at {accuracy!r}")
+    return near
+
+
+def _approaches(
+    world: World, pairs: IntArray, horizon: float, counts: Counter[str], margin: float
+) -> tuple[ContactRows, Unsupported]:
+    """When bodies come as near as the margin: a ball that large is added to one of them."""
+    count_kinds(world, pairs, counts)
+    followed = followed_in_turning(world)[pairs].all(axis=1)
+    rows = [_turning_contacts(world, pairs[followed], horizon, margin)] if followed.any() else []
+    others = pairs[~followed]
+    motion = world.twists[others]
+    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[others].any(axis=1)
+    resting &= ~world.velocity_uncertainty[others].any(axis=1)
+    near, missing = near_at_rest(world, others[resting], horizon, counts, margin)
+    moving = Unsupported.of_kinds(world, others[~resting], NO_APPROACH)
+    return (
+        ContactRows.joined([*rows, near, ContactRows.silent(missing.pairs), ContactRows.silent(moving.pairs)]),
+        Unsupported.joined([missing, moving]),
+    )
+
+
+def closing_speeds(world: World, rows: ContactRows) -> FloatArray:
+    """(k,) [m/s]: how fast the bodies approach along the normal at first contact, > 0, or part.
+
+    Of bodies that turn, at the contact point where that is fastest.  NaN without a normal, or without a point where it
+    matters, and where it is not known how an object moves.
+    """
+    a, b = rows.pairs.T
+    with np.errstate(over="ignore", invalid="ignore"):
+        x, y, z = ((world.twists[a, :3] - world.twists[b, :3]) * rows.normal).T
+        speed: FloatArray = x + y + z  # in this order everywhere
+    for k in np.flatnonzero(world.turns[rows.pairs].any(axis=1)).tolist():
+        known = rows.points[k] is not None and not world.motion_faults.keys() & {int(a[k]), int(b[k])}
+        speed[k] = np.nan
+        if known:
+            at = [_velocity(world, int(row), float(rows.time[k]), rows.points[k]) for row in (a[k], b[k])]
+            speed[k] = ((at[0] - at[1]) @ rows.normal[k]).max()
+    return speed
+
+
+def _velocity(world: World, row: int, time: float, points: FloatArray) -> FloatArray:
+    """(m, 3) of an object where it holds the given points."""
+    linear, angular = world.twists[row, :3], world.twists[row, 3:]
+    velocity: FloatArray = linear + np.cross(angular, points - (world.poses[row, :3] + time * linear))
+    return velocity
 
 
 def _rolling(world: World, pairs: IntArray) -> BoolArray:
@@ -73,8 +175,8 @@ def followed_in_turning(world: World) -> BoolArray:
     return followed
 
 
-def _turning_contacts(world: World, pairs: IntArray, horizon: float) -> ContactRows:
-    slack = _slack(world, pairs)
+def _turning_contacts(world: World, pairs: IntArray, horizon: float, margin: float = 0.0) -> ContactRows:
+    slack = _slack(world, pairs, margin)
     status, lower, upper, normal, point = _ask(world, pairs, horizon, slack)
     doubt = np.column_stack([world.uncertainty[pairs].sum(axis=1), world.velocity_uncertainty[pairs].sum(axis=1)])
     vague = np.flatnonzero(doubt.any(axis=1))
@@ -145,12 +247,12 @@ def _radius(world: World) -> FloatArray:
     return radius
 
 
-def _slack(world: World, pairs: IntArray) -> FloatArray:
+def _slack(world: World, pairs: IntArray, nearness: float) -> FloatArray:
     """(k, 3) margin, uncertainty, drift of the bodies as given."""
     names, params = _core.shape_kinds(), world.table.packed.params[world.shape]
     corners = np.where(world.kinds == names.index("convex"), params[:, 0], 0.0)  # rounded ones, of a frustum
     size = np.abs(world.poses[:, :3]).sum(axis=1) + world.table.reach[world.shape]
     ends = np.where(world.kinds == names.index("capsule"), CAPSULE_ROUNDING * size, 0.0)
-    margin = _radius(world)[pairs].sum(axis=1)
-    off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + ROUNDOFF * margin
+    margin = _radius(world)[pairs].sum(axis=1) + nearness
+    off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + 2.0 * ROUNDOFF * margin
     return np.column_stack([margin, off, np.zeros(len(pairs))])

@@ -215,7 +215,14 @@ def test_answer_docstring_explains_every_field(answer: str) -> None:
 
 # ------------------------------------------------------------------------------------------- engine and stub
 
-DTYPES = {"_F": "float64", "_I": "int64", "_U": "uint8", "_F | None": "float64 | None", "tuple[_F | _I, ...]": "tuple"}
+DTYPES = {
+    "_F": "float64",
+    "_I": "int64",
+    "_U": "uint8",
+    "_B": "bool",
+    "_F | None": "float64 | None",
+    "tuple[_F | _I, ...]": "tuple",
+}
 
 
 def stub_functions() -> dict[str, list[tuple[str, str]]]:

@@ -53,6 +53,20 @@ def test_everything_runs_when_asked_for() -> None:
     assert np.isnan(answer.contacts.depth[1]), "left and right do not touch now"
 
 
+def test_contacts_at_a_distance_and_the_earliest_alone() -> None:
+    engine = make()
+    engine.configure(engine.config.changed({"contacts.margin": 0.5, "horizon": 3.0}))
+    contacts = engine.evaluate(frozenset({CONTACTS})).contacts
+    found = dict(zip(zip(contacts.pairs.ids_a, contacts.pairs.ids_b, strict=True), contacts.pairs.time, strict=True))
+    assert contacts.margin == 0.5 and found["box", "near"] == 0.0
+    assert found["left", "right"] == pytest.approx(1.5, abs=1e-6)
+    engine.configure(engine.config.changed({"contacts.margin": 0.0, "contacts.earliest": True}))
+    alone = engine.evaluate(frozenset({CONTACTS})).contacts.pairs
+    assert (alone.ids_a, alone.ids_b, alone.time.tolist()) == (["ball"], ["box"], [0.0])
+    with pytest.raises(gs.GeometryError, match="contacts.margin must be 0 at accuracy exact"):
+        engine.config.changed({"contacts.margin": 0.5, "accuracy": "exact"})
+
+
 @pytest.mark.parametrize(
     ("asked", "runs"),
     [

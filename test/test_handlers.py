@@ -189,9 +189,34 @@ def test_first_contact_by_ids(desk) -> None:
     assert got.status == OK and got.item_status.tolist() == [1, 1]
     assert got.time.tolist() == [2.0, 2.0] and got.last_time.tolist() == [4.0, 4.0]
     assert got.normal.tolist() == [1, 0, 0, -1, 0, 0]
+    assert got.closing_speed.tolist() == [1.0, 1.0]
     assert got.point_offsets.tolist() == [0, 2, 4]
     assert got.points.tolist()[:6] == [3, 0.5, 0, 3, 1, 0]
     assert all(low <= 2.0 <= high for low, high in zip(got.time_lower, got.time_upper, strict=True))
+
+
+def test_first_contact_at_a_distance(desk) -> None:
+    pair = {"select": BY_IDS, "ids_a": ["left"], "ids_b": ["right"], "horizon": 5.0}
+    got = desk.ask("FirstContact", **pair, margin=0.5)
+    assert got.status == OK and got.item_status.tolist() == [1]
+    assert got.time_lower[0] <= 1.5 <= got.time_upper[0] and got.time_upper[0] - got.time_lower[0] <= 1e-6
+    near = desk.ask("FirstContact", **pair, margin=2.5)
+    assert near.item_status.tolist() == [3] and near.time.tolist() == [0.0]
+    for field, value, status in (("margin", -1.0, BAD_REQUEST), ("margin", math.nan, BAD_REQUEST)):
+        refused = desk.ask("FirstContact", **pair, **{field: value})
+        assert refused.status == status and field in refused.message
+    exact = desk.ask("FirstContact", **pair, margin=0.5, accuracy="exact")
+    assert exact.status == NOT_AVAILABLE and "margin" in exact.message
+    proof = desk.ask("FirstContact", **pair, margin=0.5, certificates=True)
+    assert proof.status == NOT_AVAILABLE and "margin" in proof.message
+
+
+def test_first_contact_earliest(desk) -> None:
+    full = desk.ask("FirstContact", select=ALL, horizon=5.0)
+    alone = desk.ask("FirstContact", select=ALL, horizon=5.0, earliest=True)
+    assert alone.status == full.status and (alone.ids_a[:1], alone.time[:1]) == (full.ids_a[:1], full.time[:1])
+    listed = desk.ask("FirstContact", select=BY_IDS, ids_a=["left"], ids_b=["right"], horizon=5.0, earliest=True)
+    assert listed.status == BAD_REQUEST and "earliest" in listed.message
 
 
 def test_first_contact_never_and_without_points(desk) -> None:
@@ -357,7 +382,7 @@ def test_first_contact_batch(desk) -> None:
     got = desk.ask("FirstContactBatch", **fields, want=["contact_set"])
     assert got.item_status.tolist() == [1, 0] and got.time[0] == 2.0 and got.last_time[0] == 4.0
     assert got.points.tolist() == [3, 0.5, 3, 1] and got.point_offsets.tolist() == [0, 2, 2]
-    assert got.normal.tolist()[:2] == [1, 0]
+    assert got.normal.tolist()[:2] == [1, 0] and got.closing_speed[0] == 1.0 and math.isnan(got.closing_speed[1])
     solid = desk.ask(
         "FirstContactBatch",
         dimension=3,

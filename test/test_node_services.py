@@ -83,6 +83,10 @@ def test_first_contact(client) -> None:
     assert got.status == got.OK and (got.ids_a, got.ids_b) == (["left"], ["right"])
     assert list(got.item_status) == [got.WILL_TOUCH] and list(got.time) == [2.0] and list(got.last_time) == [4.0]
     assert vectors(got.points).tolist() == [[3, 0.5, 0], [3, 1, 0]] and list(got.point_offsets) == [0, 2]
+    assert list(got.closing_speed) == [1.0]
+    request = srv.FirstContact.Request(select=request.select, horizon=5.0, margin=0.25, earliest=True)
+    got = client.call(srv.FirstContact, "first_contact", request)
+    assert got.status == got.OK and list(got.item_status) == [got.WILL_TOUCH] and abs(got.time[0] - 1.75) <= 1e-6
 
 
 def test_cull(client) -> None:

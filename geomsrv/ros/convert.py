@@ -447,16 +447,17 @@ def set_contacts(
         pairs.time_upper,
         pairs.last_time,
         answer.depth,
+        pairs.closing_speed,
         pairs.normal,
     )
-    status, time, lower, upper, last, depth, normal = (column.tolist() for column in columns)
+    status, time, lower, upper, last, depth, speed, normal = (column.tolist() for column in columns)
     points, offsets = pairs.points.tolist(), pairs.point_offsets.tolist()
     contacts = []
     for i in np.argsort(pairs.time, kind="stable").tolist():
         contact = contact_type()
         contact.id_a, contact.id_b, contact.status = pairs.ids_a[i], pairs.ids_b[i], status[i]
         contact.time, contact.time_lower, contact.time_upper = time[i], lower[i], upper[i]
-        contact.last_time, contact.depth = last[i], depth[i]
+        contact.last_time, contact.depth, contact.closing_speed = last[i], depth[i], speed[i]
         set_vector(contact.normal, normal[i])
         for row in points[offsets[i] : offsets[i + 1]]:
             point = point_type()
@@ -465,7 +466,8 @@ def set_contacts(
         contact.note = notes.get((contact.id_a, contact.id_b), "")
         contacts.append(contact)
     message.contacts = contacts
-    message.scene_version, message.horizon, message.checked = pairs.version, answer.horizon, answer.checked
+    message.scene_version, message.checked = pairs.version, answer.checked
+    message.horizon, message.margin = answer.horizon, answer.margin
     set_cost(message.cost, pairs.cost)
 
 

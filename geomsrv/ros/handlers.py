@@ -298,14 +298,20 @@ class Handlers:
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE, "twists_a", "twists_b")
             _listed_only(request)
-            answer = self.engine.scene.first_contacts(request.horizon, accuracy=accuracy)
+            answer = self.engine.scene.first_contacts(
+                request.horizon, margin=request.margin, earliest=request.earliest, accuracy=accuracy
+            )
             order = np.argsort(answer.time, kind="stable")
             response.ids_a = [answer.ids_a[i] for i in order.tolist()]
             response.ids_b = [answer.ids_b[i] for i in order.tolist()]
             response.scene_version = answer.version
         else:
             world, pairs = self._listed(request, moving=True)
-            answer = listed_first_contacts(world, pairs, request.horizon, accuracy=accuracy)
+            if request.earliest:
+                raise GeometryError("earliest must be false here: it is for ALL_PAIRS")
+            if request.certificates and request.margin != 0.0:
+                raise NotAvailableError("certificates are given for contact, not for coming as near as a margin")
+            answer = listed_first_contacts(world, pairs, request.horizon, margin=request.margin, accuracy=accuracy)
             order = None  # that of the request
             if request.certificates:
                 lines = contact_certificates(world, pairs, request.horizon, accuracy=accuracy)
@@ -527,7 +533,7 @@ def _side(kind: int, values: Any, offsets: Any, side: str) -> Any:
 # ---------------------------------------------------------------------------------------------------- responses
 
 _DISTANCE_COLUMNS = ("distance", "lower", "upper", "point_a", "point_b", "normal")
-_CONTACT_COLUMNS = ("time", "time_lower", "time_upper", "last_time", "normal")
+_CONTACT_COLUMNS = ("time", "time_lower", "time_upper", "last_time", "normal", "closing_speed")
 
 
 def _distance_columns(want: tuple[str, ...]) -> tuple[str, ...]:
