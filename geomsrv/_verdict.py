@@ -18,7 +18,8 @@ import numpy as np
 
 from geomsrv.answers import ContactStatus, CullState, DistanceStatus
 from geomsrv.errors import GeometryError, NotAvailableError
-from geomsrv.hard_cases import DECIDABLE, Case, Motion, Truth, signed_square
+from geomsrv.hard_cases import DECIDABLE, MOVING, TIME_VERIFIED, Case, Motion, Truth, signed_square
+from geomsrv.pairwise import Bodies, listed_first_contacts, world_of
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
 from geomsrv.shapes import Frustum
 
@@ -171,6 +172,28 @@ def _first_contact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]
         yield _contact_set(answer.points, motion, truth.scale)
 
 
+def _time_of_impact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]:
+    """A moving field case, as a client of the scene's services asks it."""
+    assert truth.motion is not None
+    a, b, poses, twists = case.bodies
+    world = world_of(Bodies([a, b], poses, twists))
+    answer = listed_first_contacts(world, np.array([[0, 1]]), float(case.given["motion"]["tmax"]), accuracy=accuracy)
+    status, expected = ContactStatus(int(answer.status[0])), truth.motion
+    if status == ContactStatus.UNSUPPORTED:
+        return
+    certain = status not in (ContactStatus.GRAZING, ContactStatus.NOT_CONVERGED)
+    if accuracy == "bound":  # but for NEVER, it only says that they may
+        certain = status == ContactStatus.NEVER
+    missed = accuracy == "bound" and status == ContactStatus.NEVER != expected.status
+    yield _boolean(status == expected.status, certain, missed, f"{status.name}{'' if certain else ', uncertain'}")
+    if expected.time is None or status == ContactStatus.NEVER:
+        return
+    low, high = float(answer.time_lower[0]), float(answer.time_upper[0])
+    slack = TIME_VERIFIED * expected.time_scale
+    right = Fraction(low) <= expected.time + slack and (high == math.inf or expected.time - slack <= Fraction(high))
+    yield _boolean(right, True, False, f"time in [{low!r}, {high!r}], should be {float(expected.time)!r}")
+
+
 def _contact_set(points: Any, motion: Motion, scale: Fraction) -> Finding:
     """Whether the corners are those of the exact set, but for the rounding of coordinates."""
     told = [tuple(map(Fraction, point)) for point in points.tolist()]
@@ -197,6 +220,8 @@ _QUERIES: dict[str, tuple[_Query, ...]] = {
     "segment_segment": (_distance, _intersects),
     "collide": (_distance, _intersects),
     "frustum_cull": (_cull, _distance, _intersects),
+    "toi": (_time_of_impact,),
+    "toi_rotating": (_time_of_impact,),
 }
 
 
@@ -282,7 +307,7 @@ def _nearest(x: Fraction) -> float:
 
 def truth_by_engine(case: Case) -> Truth | None:
     """What the exact tier says, for a case whose file does not tell; None if it has no kernel for it."""
-    if case.kind.endswith("moving"):
+    if case.kind in MOVING:
         return None
     try:
         answer = distance(*case.bodies, accuracy="exact", want=("penetration",))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -42,7 +42,7 @@ from geomsrv.shapes import (
     Triangle,
 )
 
-__all__ = ["KINDS", "Case", "Motion", "Truth", "decides", "quaternion_of", "read", "shipped", "signed_square"]
+__all__ = ["KINDS", "MOVING", "Case", "Motion", "Truth", "decides", "quaternion_of", "read", "shipped", "signed_square"]
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +61,12 @@ KINDS = (
     "segment_segment",
     "collide",
     "frustum_cull",
+    "toi",
+    "toi_rotating",
 )
+
+#: Kinds that ask when bodies first touch.
+MOVING = ("polygon2d_moving", "polyhedra_moving", "toi", "toi_rotating")
 
 # From this share of the scene on, doubles that first subtract a common origin can tell apart from touching: 53 bits,
 # less 13 for the operations of a query and their conditioning.
@@ -162,6 +167,8 @@ class Case:
     def bodies(self) -> tuple[Any, ...]:
         """Arguments of `distance`: two batches of one in world coordinates, or two shapes and a pose.
 
+        Of a moving field case two shapes, their poses (2, 7) and their twists (2, 6).
+
         Raises
         ------
         GeometryError
@@ -182,6 +189,8 @@ class Case:
             case "polygon2d_distance" | "polygon2d_moving":
                 return Polygons.from_list([given["P"]]), Polygons.from_list([given["Q"]])
         first, second = given["shapes"]
+        if self.kind in MOVING:
+            return shape_of(first), shape_of(second), *_motion_of(given)
         if self.kind == "frustum_cull" and second["type"] == "box":
             if (view := _viewed(given["frustum"], first["vertices"])) is not None:
                 return view, _placed_box(second)
@@ -283,6 +292,25 @@ def _placed_box(given: dict[str, Any]) -> Boxes:
     return Boxes(position[None], rotation.T[None], np.array([given["size"]]) / 2.0)
 
 
+def _motion_of(given: dict[str, Any]) -> tuple[FloatArray, FloatArray]:
+    """Poses (2, 7) and twists (2, 6) of a moving case; a sweep goes from p0 to p1, turning from a0 to a1 about z."""
+    poses, twists = np.zeros((2, 7)), np.zeros((2, 6))
+    motion = given["motion"]
+    for k, shape in enumerate(given["shapes"]):
+        rotation, poses[k, :3] = pose_of(shape)
+        if "v" in motion:
+            twists[k, :3] = motion["v"][k]
+        else:
+            sweep = motion["sweeps"][k]
+            start, end, angle = np.array(sweep["p0"], dtype=float), np.array(sweep["p1"], dtype=float), sweep["a0"]
+            cosine, sine = math.cos(angle), math.sin(angle)
+            rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ rotation
+            poses[k, :3] += start
+            twists[k, :3], twists[k, 5] = end - start, sweep["a1"] - angle
+        poses[k, 3:] = quaternion_of(rotation)
+    return poses, twists
+
+
 # ------------------------------------------------------------------------------------------------------ from files
 
 
@@ -370,9 +398,11 @@ def time_scale(scale: Fraction, squared_speed: Fraction | None) -> Fraction:
 
 def _posed(record: dict[str, Any]) -> Case:
     """A field case: shapes in poses, and a value that was verified in decimal."""
-    given = {"shapes": record["shapes"], "frustum": record.get("frustum")}
+    given = {"shapes": record["shapes"], "frustum": record.get("frustum"), "motion": record.get("motion")}
     case = Case(record["id"], record["kind"], record["failure_class"], given)
     value = record["verified_value"]
+    if case.kind in MOVING:
+        return replace(case, truth=_timed(record))
     if value is None:
         return case
     scale = Fraction(scene_size(record["shapes"]))
@@ -381,6 +411,21 @@ def _posed(record: dict[str, Any]) -> Case:
     value = Fraction(value)
     truth = Truth(signed_square(value - slack), signed_square(value + slack), scale, abs(value) > slack)
     return Case(case.name, case.kind, case.group, given, truth)
+
+
+# Times of moving field cases are verified to this, relative to themselves or in seconds.
+TIME_VERIFIED = Fraction(1, 10**9)
+
+
+def _timed(record: dict[str, Any]) -> Truth:
+    """Of a field case with a time of impact, or none."""
+    time, scale = record["verified_value"], Fraction(scene_size(record["shapes"]))
+    if time is None:
+        motion = Motion(ContactStatus.NEVER)
+    else:
+        status = ContactStatus.WILL_TOUCH if time > 0.0 else ContactStatus.OVERLAPPING
+        motion = Motion(status, Fraction(time), time_scale=max(Fraction(1), Fraction(time)))
+    return Truth(Fraction(0), Fraction(0), scale, True, motion=motion)
 
 
 def scene_size(shapes: Iterable[dict[str, Any]]) -> float:

@@ -19,7 +19,7 @@ from geomsrv._judge import PEERS as PEER_KINDS
 from geomsrv._judge import Solid, pair_kind
 from geomsrv._verdict import Finding, Verdict, judge, judge_peer, truth_by_engine
 from geomsrv.errors import GeometryError
-from geomsrv.hard_cases import Case, Truth, quaternion_of, read
+from geomsrv.hard_cases import MOVING, Case, Truth, quaternion_of, read
 from geomsrv.shapes import Box, Boxes, Convex, Frustum, Polygons, Polytopes, Shape
 
 __all__ = ["PEERS", "TIERS", "Report", "Tally", "check", "unsupported"]
@@ -149,10 +149,6 @@ def check(
     return report
 
 
-#: Shapes whose first contact in translation is answered; what is asked about it in a file is judged by the tests.
-FOLLOWED = frozenset({"box", "convex", "segment", "triangle"})
-
-
 def unsupported(path: Path) -> dict[tuple[str, str], list[str]]:
     """Names of a file's cases that the engine has no query or no kernel for, by kind and shapes."""
     answered = {case.name for case in read(path) if case.truth and judge(case, "float64", case.truth)}
@@ -160,8 +156,6 @@ def unsupported(path: Path) -> dict[tuple[str, str], list[str]]:
     for line in path.read_text(encoding="utf-8").splitlines():
         record = json.loads(line)
         kinds = [shape["type"] for shape in record.get("shapes", ())]
-        if record["kind"] == "toi" and FOLLOWED.issuperset(kinds):
-            continue
         if record["id"] not in answered and record.get("complete_inputs", True):
             shapes = " – ".join(sorted(kinds))
             found.setdefault((record["kind"], shapes), []).append(record["id"])
@@ -205,7 +199,7 @@ def _ask_peer(name: str, known: list[tuple[str, Case, Truth]], report: Report, t
 
 def _for_peer(case: Case) -> tuple[Shape, Shape, FloatArray] | None:
     """Two shapes and the pose of the second in the first; None if no peer is asked."""
-    if case.kind.endswith("moving"):
+    if case.kind in MOVING:
         return None
     try:
         bodies = case.bodies

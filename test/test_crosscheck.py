@@ -510,6 +510,7 @@ class Blocker:
 
 
 def test_without_fcl_the_mode_says_so_and_the_rest_works(rng, monkeypatch):
+    monkeypatch.delitem(sys.modules, "fcl", raising=False)
     monkeypatch.setattr(sys, "meta_path", [Blocker(), *sys.meta_path])
     with CrossCheck("all") as check:
         assert not check.available and "python-fcl" in check.reason

@@ -16,10 +16,12 @@ from oracle import polygon, polytope
 import geomsrv as gs
 from geomsrv import _verdict
 from geomsrv._verdict import Verdict, judge
-from geomsrv.hard_cases import VERIFIED, Case, pose_of, read, scene_size, shape_of
+from geomsrv.hard_cases import MOVING, VERIFIED, Case, pose_of, read, scene_size, shape_of
 
 TIERS = ("float64", "exact")
-CASES = {case.name: case for case in read(FIELD) if case.truth and judge(case, "float64")}
+ANSWERED = {case.name: case for case in read(FIELD) if case.truth and judge(case, "float64")}
+CASES = {name: case for name, case in ANSWERED.items() if case.kind not in MOVING}
+MOTIONS = {name: case for name, case in ANSWERED.items() if case.kind in MOVING}
 RECORDS = {
     record["id"]: record
     for kind in ("signed_distance", "distance", "segment_segment", "collide", "frustum_cull")
@@ -183,3 +185,26 @@ def test_first_contact_of_solids(name: str, tier: str) -> None:
 
 def test_enough_motions_of_solids() -> None:
     assert len(SOLID_MOTIONS) >= 8
+
+
+# A point that meets a point, or a segment, in space: the slightest push parts them, so contact is not proven, nor its
+# absence.
+INSTANTS = {"ipc-nonlinear-point-point", "ipc-rigid2d-point-edge"}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_time_of_impact(name: str) -> None:
+    """As the scene answers, round bodies and turning ones included; at every tier that follows them."""
+    case = MOTIONS[name]
+    for tier in ("bound", *TIERS):
+        finding = judge(case, tier)
+        if tier == "float64":
+            assert finding is not None
+            assert finding.verdict == (Verdict.UNCERTAIN if name in INSTANTS else Verdict.RIGHT), finding
+        assert finding is None or finding.verdict != Verdict.WRONG, (tier, finding)
+
+
+def test_all_motions_are_answered() -> None:
+    listed = [case["id"] for kind in ("toi", "toi_rotating") for case in field_cases(kind)]
+    assert sorted(MOTIONS) == sorted(listed) and len(listed) >= 23
+    assert sum(judge(case, "exact") is not None for case in MOTIONS.values()) >= 8
