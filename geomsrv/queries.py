@@ -22,13 +22,16 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
+from geomsrv.mesh import first_contact_meshes
 from geomsrv.region import Region, distance_regions, first_contact_regions, intersects_regions
 from geomsrv.shapes import (
     Boxes,
     Capsule,
+    Convex,
     Frustum,
     Frustum2D,
     HalfSpace,
+    Mesh,
     Polygons,
     Polytopes,
     Shape,
@@ -40,6 +43,7 @@ from geomsrv.turning import first_contact_turning, turns
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
 FloatArray = NDArray[np.float64]
+_Convex = Boxes | Polygons | Polytopes
 Batch = Boxes | Polygons | Polytopes | Frustum
 
 TIERS = ("bound", "float32", "float64", "exact")  #: of queries that answer at all of them
@@ -199,8 +203,8 @@ def distance_to_frustum(
 
 
 def first_contact(
-    a: Boxes | Polygons | Polytopes | Region,
-    b: Boxes | Polygons | Polytopes | Region,
+    a: Boxes | Polygons | Polytopes | Region | Mesh | Convex,
+    b: Boxes | Polygons | Polytopes | Region | Mesh | Convex,
     velocity_a: ArrayLike,
     velocity_b: ArrayLike,
     *,
@@ -214,13 +218,14 @@ def first_contact(
     center_b: ArrayLike | None = None,
     tolerance: float = 1e-6,
 ) -> FirstContacts:
-    """When and where convex bodies first touch that translate, or translate and turn.
+    """When and where bodies first touch that translate, or translate and turn.
 
     Parameters
     ----------
     a, b : Polygons (2D), Polytopes or Boxes (3D)
         n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another,
-        at the cost of all pairs of pieces.
+        at the cost of all pairs of pieces.  A Mesh, which is a surface, and a Convex are one body each, in world
+        coordinates here, against each other, Boxes or Polytopes; a Mesh cannot turn yet.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float
@@ -254,9 +259,10 @@ def first_contact(
         (double-double) and in "exact" arithmetic, which "float64", too, turns to where bodies pass within the slack.
 
         Of a Region ``parts`` lists what may be several points and segments, no seam among them; bodies that overlap at
-        the start share convex polygons, one for each pair of pieces.  ``normal`` parts the bodies near all points of
-        contact, and is NaN where no one normal does, as in a notch; ``last_time`` is the last of all contacts, between
-        which they may be apart.
+        the start share convex polygons, one for each pair of pieces.  Of a Mesh there may also be areas: rings around
+        them, counter-clockwise about the normal, and clockwise ones around their holes.  ``normal`` parts the bodies
+        near all points of contact, and is NaN where no one normal does, as in a notch; ``last_time`` is the last of all
+        contacts, between which they may be apart.
 
         If anything turns, ``time`` is ``time_lower``: the bodies are proven apart before it, and proven in contact at
         some time until ``time_upper``.  ``normal``, ``closing_speed``, and one contact point midway between the nearest
@@ -297,10 +303,20 @@ def first_contact(
     >>> hit = gs.first_contact(cube, point, (1, 0, 0), (-1, 0, 0), accuracy="exact")
     >>> hit.time, hit.normal.tolist(), hit.closing_speed, hit.points.tolist()
     (array([2.]), [[1.0, 0.0, 0.0]], array([2.]), [[3.0, 0.5, 0.0]])
+
+    Meshes touch along whole areas, here a square of two triangles on a box:
+
+    >>> tile = gs.Mesh([(0, 0, 3), (1, 0, 3), (1, 1, 3), (0, 1, 3)], [(0, 1, 2), (0, 2, 3)])
+    >>> hit = gs.first_contact(tile, cube, (0, 0, -1), (0, 0, 0))
+    >>> hit.time, [len(part) for part in hit.parts(0)]
+    (array([2.]), [4])
     """
     start = time.perf_counter_ns()
-    if isinstance(a, Region) or isinstance(b, Region):
-        options = {
+    by_pieces = first_contact_regions if isinstance(a, Region) or isinstance(b, Region) else None
+    if isinstance(a, Mesh | Convex) or isinstance(b, Mesh | Convex):
+        by_pieces = first_contact_meshes
+    if by_pieces is not None:
+        options: dict[str, Any] = {
             "t_max": t_max,
             "accuracy": accuracy,
             "contact_set": contact_set,
@@ -311,7 +327,7 @@ def first_contact(
             "center_b": center_b,
             "tolerance": tolerance,
         }
-        return first_contact_regions(first_contact, a, b, (velocity_a, velocity_b), options)
+        return by_pieces(first_contact, a, b, (velocity_a, velocity_b), options)
     if turns(angular_velocity_a, angular_velocity_b):
         return first_contact_turning(
             (a, b),
@@ -326,6 +342,7 @@ def first_contact(
         )
     _expect(a, (Polygons, Polytopes, Boxes), "a")
     _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
+    a, b = cast(tuple[_Convex, _Convex], (a, b))
     count = _validate.common_length(len(a), len(b))
     d = 2 if isinstance(a, Polygons) else 3
     moving_a, moving_b = (

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from geomsrv.errors import GeometryError
 from geomsrv.scene import SceneObject
-from geomsrv.shapes import Box, Convex, Cylinder, Shape, Sphere
+from geomsrv.shapes import Box, Convex, Cylinder, Mesh, Shape, Sphere
 
 __all__ = ["Robot", "example_robot_directory"]
 
@@ -39,7 +39,8 @@ class _Collision:
 class Robot:
     """Collision geometry of a robot description.
 
-    Meshes become their convex hulls.  A link with several geometries gives one object each, ``link/0``, ``link/1``...
+    Meshes become their convex hulls, or stay what they are.  A link with several geometries gives one object each,
+    ``link/0``, ``link/1``...
 
     Parameters
     ----------
@@ -51,6 +52,8 @@ class Robot:
         Where ``package://name/...`` is looked up, as ``directory/name/...``.
     prefix : str
         Put before every object id.
+    hulls : bool
+        Whether a mesh is taken as its convex hull, which every query answers, or as a `Mesh`.
 
     Raises
     ------
@@ -65,8 +68,10 @@ class Robot:
         *,
         mesh_directories: Sequence[str | Path] = (),
         prefix: str = "",
+        hulls: bool = True,
     ) -> None:
         yourdfpy = _import("yourdfpy")
+        self._hulls = hulls
         self._directories = [Path(urdf).resolve().parent, *map(Path, mesh_directories)]
         if not Path(urdf).is_file():
             raise GeometryError(f"urdf: no such file: {urdf}")
@@ -133,7 +138,9 @@ class Robot:
         if geometry.mesh is not None:
             mesh = _import("trimesh").load(self._resolve(geometry.mesh.filename), force="mesh")
             scale = 1.0 if geometry.mesh.scale is None else np.asarray(geometry.mesh.scale, np.float64)
-            return Convex(np.asarray(mesh.convex_hull.vertices, np.float64) * scale)
+            if self._hulls:
+                return Convex(np.asarray(mesh.convex_hull.vertices, np.float64) * scale)
+            return Mesh(np.asarray(mesh.vertices, np.float64) * scale, np.asarray(mesh.faces, np.int64))
         raise GeometryError(f"link {link!r}: collision geometry of an unknown kind")
 
     def _resolve(self, filename: str) -> Path:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geomsrv import _core, _validate
 from geomsrv.errors import GeometryError
+from geomsrv.mesh_tree import Tree, ordered
 
 __all__ = [
     "Box",
@@ -634,11 +636,26 @@ class Convex(Shape):
 
 @dataclass(frozen=True, init=False, eq=False)
 class Mesh(Shape):
-    """Triangle mesh: `vertices` (m, 3) [m] and `triangles` (k, 3) vertex indices."""
+    """Triangle mesh: `vertices` (m, 3) [m] and `triangles` (k, 3) vertex indices.
+
+    It is a surface, the union of its triangles, in any order, closed or not: what it encloses is no part of it.
+    """
 
     vertices: FloatArray
     triangles: NDArray[np.int64]
     kind: ClassVar[str] = "mesh"
+
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """Triangles in the order of `ordered`; found on first use."""
+        corners = self.vertices[self.triangles]
+        return ordered(corners.min(axis=1), corners.max(axis=1))
+
+    @cached_property
+    def tree(self) -> Tree:
+        """Boxes around triangles, in its own frame; found on first use."""
+        corners = self.vertices[self.triangles]
+        return Tree.of(corners.min(axis=1), corners.max(axis=1), self.order)
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
         points = _validate.floats(vertices, "vertices", (None, 3))

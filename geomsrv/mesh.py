@@ -1,0 +1,268 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""First contact of triangle meshes: that of all pairs of triangles, or of triangles and convex bodies."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geomsrv import _validate
+from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray, IntArray
+from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.mesh_contact import common_plane, united_in_space
+from geomsrv.mesh_tree import Sweep, Tree, in_order
+from geomsrv.shapes import Boxes, Convex, Mesh, Polytopes
+from geomsrv.turning import turns
+from geomsrv.verify import Pair, clip_of, relative_velocity, way_of
+
+__all__ = ["first_contact_meshes"]
+
+# A contact point found for several pairs of pieces: a vertex moved by a product and a sum, or a point of an edge, up
+# to the slack within which bodies of such coordinates touch; some 60 roundings of their size, rounded up.
+PLACE_ROUNDING = 256.0 * 2.0**-53
+
+Ask = Callable[..., FirstContacts]
+
+
+def first_contact_meshes(
+    ask: Ask, a: Any, b: Any, velocities: tuple[ArrayLike, ArrayLike], options: dict[str, Any]
+) -> FirstContacts:
+    """The answer of `first_contact`, which is passed in, where a or b is a mesh."""
+    start = time.perf_counter_ns()
+    if turns(options.pop("angular_velocity_a"), options.pop("angular_velocity_b")):
+        raise NotAvailableError("meshes that turn are not available yet")
+    del options["center_a"], options["center_b"], options["tolerance"]
+    if options["certificates"]:
+        raise NotAvailableError("certificates of a Mesh are not available yet")
+    bodies = [_Pieces(body, name) for body, name in ((a, "a"), (b, "b"))]
+    count = _validate.common_length(*(body.items for body in bodies))
+    moving = [_rows(v, f"velocity_{name}", count) for v, name in zip(velocities, "ab", strict=True)]
+    end = _validate.limit(options["t_max"], "t_max")
+    # What is refused is refused even where no boxes meet.
+    none = Polytopes(np.zeros((0, 3)), [0])
+    tier = ask(none, none, (0, 0, 0), (0, 0, 0), **options).cost.accuracy
+    wanted, options = bool(options["contact_set"]), {**options, "contact_set": True}
+    counts: Counter[str] = Counter()
+    rows = [_first(ask, bodies, i, (moving[0][i], moving[1][i]), end, options, counts) for i in range(count)]
+    sets = [row.parts if wanted else [] for row in rows]
+    points = [part for parts in sets for part in parts]
+    ends = np.cumsum([0, *map(len, points)], dtype=np.int64)
+    numbers = np.array([row.numbers for row in rows]).reshape(-1, 4)
+    normal = np.array([row.normal for row in rows]).reshape(-1, 3)
+
+    def speed() -> FloatArray:
+        with np.errstate(over="ignore", invalid="ignore"):
+            x, y, z = ((moving[0] - moving[1]) * normal).T
+        closing: FloatArray = x + y + z  # in this order everywhere
+        return closing
+
+    middle, lower, upper, last = (np.ascontiguousarray(column) for column in numbers.T)
+    return FirstContacts(
+        status=np.array([row.status for row in rows], np.uint8),
+        time=middle,
+        time_lower=lower,
+        time_upper=upper,
+        last_time=last,
+        normal=normal,
+        points=np.concatenate([np.zeros((0, 3)), *points]),
+        point_offsets=ends[np.cumsum([0, *map(len, sets)])],
+        certain=np.array([row.certain for row in rows], np.bool_),
+        _closing_speed=speed,
+        cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+        _part_offsets=ends,
+    )
+
+
+class _Pieces:
+    """Convex pieces of every item of a body."""
+
+    def __init__(self, body: Any, name: str) -> None:
+        if not isinstance(body, (Mesh, Convex, Boxes, Polytopes)):
+            raise GeometryError(f"{name} must be Mesh, Boxes, Polytopes or Convex, got {type(body).__name__}")
+        self._body: Mesh | Boxes | Polytopes = (
+            Polytopes(body.vertices, [0, len(body.vertices)]) if isinstance(body, Convex) else body
+        )
+        self.items = 1 if isinstance(self._body, Mesh) else len(self._body)
+
+    def tree(self, i: int) -> Tree:
+        """Boxes around the pieces of item i."""
+        body, i = self._body, i if self.items > 1 else 0
+        if isinstance(body, Mesh):
+            return body.tree
+        points = self.corners(i, 0)
+        return Tree.of(points.min(axis=0)[None], points.max(axis=0)[None], np.zeros(1, np.int64))
+
+    def batch(self, i: int, pieces: IntArray) -> Boxes | Polytopes:
+        """Listed pieces of item i."""
+        body, i = self._body, i if self.items > 1 else 0
+        if isinstance(body, Mesh):
+            corners = body.vertices[body.triangles[pieces]].reshape(-1, 3)
+            return Polytopes(corners, np.arange(0, len(corners) + 1, 3))
+        # One for all.
+        if isinstance(body, Boxes):
+            return Boxes(body.center[i : i + 1], body.axes[i : i + 1], body.half_extents[i : i + 1])
+        return Polytopes(body[i], [0, len(body[i])])
+
+    def corners(self, i: int, piece: int) -> FloatArray:
+        """Vertices of one piece, relative to nothing."""
+        batch = self.batch(i, np.array([piece]))
+        return batch.corners()[0] if isinstance(batch, Boxes) else batch[0]
+
+
+class _Row:
+    """Answer for one item."""
+
+    status: int = ContactStatus.NEVER
+    numbers = (np.nan, np.nan, np.nan, np.nan)  #: time, lower, upper, last
+    certain: bool = True
+
+    def __init__(self) -> None:
+        self.normal = np.full(3, np.nan)
+        self.parts: list[FloatArray] = []
+
+
+class _Found:
+    """What is known so far of pairs of pieces of one item: columns that grow."""
+
+    def __init__(self) -> None:
+        self.answers: list[FirstContacts] = []
+        self.pieces: list[tuple[IntArray, IntArray]] = []
+
+    def column(self, name: str) -> Any:
+        return np.concatenate([getattr(answer, name) for answer in self.answers])
+
+    def listed(self, rows: IntArray) -> tuple[IntArray, IntArray]:
+        """Pieces of the listed pairs."""
+        one, two = (np.concatenate([pieces[side] for pieces in self.pieces]) for side in range(2))
+        return one[rows], two[rows]
+
+    def set_of(self, row: int) -> FloatArray:
+        """Points that a pair has in common."""
+        for answer in self.answers:
+            if row < len(answer.status):
+                return answer.points[answer.point_offsets[row] : answer.point_offsets[row + 1]]
+            row -= len(answer.status)
+        raise IndexError(row)
+
+
+def _first(
+    ask: Ask,
+    bodies: list[_Pieces],
+    i: int,
+    ways: tuple[FloatArray, FloatArray],
+    end: float,
+    options: dict[str, Any],
+    counts: Counter[str],
+) -> _Row:
+    found, row = _Found(), _Row()
+    bound, last = end, -np.inf
+
+    def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
+        nonlocal bound, last
+        answer = ask(
+            *(body.batch(i, p) for body, p in zip(bodies, (pieces_a, pieces_b), strict=True)), *ways, **options
+        )
+        counts.update(answer.cost.counts)
+        counts["pairs of pieces"] += len(pieces_a)
+        found.answers.append(answer)
+        found.pieces.append((pieces_a, pieces_b))
+        bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
+        last = float(np.fmax.reduce(answer.last_time, initial=last))
+
+    def earliest(pieces_a: IntArray, pieces_b: IntArray) -> float:
+        look(pieces_a, pieces_b)
+        return bound
+
+    def latest(pieces_a: IntArray, pieces_b: IntArray) -> float:
+        look(pieces_a, pieces_b)
+        return last
+
+    sweep = Sweep.of(bodies[0].tree(i), bodies[1].tree(i), *ways)
+    in_order(sweep, bound, False, earliest)
+    if not found.answers:
+        return row
+    status = found.column("status")
+    sure = found.column("certain")
+    row.certain = bool(sure.all())
+    if not (status != ContactStatus.NEVER).any():
+        return row
+    lower, upper, middle = (found.column(name) for name in ("time_lower", "time_upper", "time"))
+    high = float(np.fmin.reduce(upper))
+    tied = np.flatnonzero(lower <= high)
+    answers = len(found.answers)
+    if last < end:
+        in_order(sweep, last, True, latest)
+    del found.answers[answers:]  # none of them is earlier
+    deep = status == ContactStatus.OVERLAPPING
+    row.status = int(status[tied].max())
+    row.numbers = (float(np.fmin.reduce(middle)), float(np.fmin.reduce(lower)), high, last)
+    overlapping = row.status == ContactStatus.OVERLAPPING
+    row.certain |= bool((deep & sure).any())
+    if options["accuracy"] == "bound":
+        return row
+    if options["accuracy"] == "exact" and len(tied) > 1 and (lower[tied] < upper[tied]).any():
+        tied = tied[_exactly_first(ask, bodies, i, ways, options, found.listed(tied))]
+    sets = [found.set_of(k) for k in tied.tolist()]
+    moved = [
+        tuple(body.corners(i, p) + row.numbers[0] * way for body, p, way in zip(bodies, pair, ways, strict=True))
+        for pair in zip(*(pieces.tolist() for pieces in found.listed(tied)), strict=True)
+    ]
+    # In a power of two near the size, so that no product overflows or vanishes.
+    size = max(float(np.abs(part).max()) for part in (*sets, *(piece for pair in moved for piece in pair)))
+    unit = math.frexp(size)[1] if math.isfinite(size) else 0
+    sets = [np.ldexp(part, -unit) for part in sets]
+    spread = float(middle[tied].max() - row.numbers[0])
+    slack = PLACE_ROUNDING + math.ldexp(max(float(np.abs(way).max()) for way in ways) * spread, -unit)
+    if not overlapping:
+        near = [(np.ldexp(a, -unit), np.ldexp(b, -unit)) for a, b in moved]
+        velocity = 0.5 * ways[0] - 0.5 * ways[1]
+        row.normal = common_plane(
+            near, np.array([part[0] for part in sets]), found.column("normal")[tied], velocity, slack
+        )
+    row.parts = [np.ldexp(part, unit) for part in united_in_space(sets, slack, row.normal)]
+    if not overlapping:
+        if row.status == ContactStatus.TOUCHING and len(tied) > 1 and np.isnan(row.normal[0]):
+            row.certain = False  # none may pass through the other, and both together do
+    return row
+
+
+def _exactly_first(
+    ask: Ask,
+    bodies: list[_Pieces],
+    i: int,
+    ways: tuple[FloatArray, FloatArray],
+    options: dict[str, Any],
+    pieces: tuple[IntArray, IntArray],
+) -> IntArray:
+    """Of pairs whose times round to neighbours those that are first: as their proofs tell, in rational numbers."""
+    sides = (body.batch(i, p) for body, p in zip(bodies, pieces, strict=True))
+    answer = ask(*sides, *ways, **{**options, "certificates": True})
+    times = [_time_of(record) for record in answer.certificates or ()]
+    return np.flatnonzero([time == min(times) for time in times])
+
+
+def _time_of(record: dict[str, Any]) -> Fraction:
+    if record["claim"]["status"] != "WILL_TOUCH":
+        return Fraction(0)
+    pair = Pair(record["a"], record["b"])
+    speed = relative_velocity(record["a"], record["b"], pair.unit)
+    begun = clip_of(pair, speed, way_of(pair, speed, record["evidence"]))[1]
+    assert begun is not None, "a proof of a contact has its time"
+    return begun
+
+
+def _rows(value: ArrayLike, name: str, count: int) -> FloatArray:
+    """(n, 3) or (3,) -> (n, 3)."""
+    given = _validate.array(value, name)
+    rows = _validate.floats(given, name, (3,) if given.ndim == 1 else (None, 3)).reshape(-1, 3)
+    if len(rows) not in (1, count):
+        raise GeometryError(f"{name} must have shape (3,) or ({count}, 3), got {given.shape}")
+    return np.broadcast_to(rows, (count, 3))

@@ -1,0 +1,360 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""What pairs of pieces have in common in space, put together: the contact set of the whole, and its normal.
+
+Points, ends and corners are those that were found for pairs of pieces, rounded there; which of them are the same, on
+a line or in a plane is decided within a slack, in float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomsrv.answers import BoolArray, FloatArray, IntArray
+
+__all__ = ["common_plane", "united_in_space"]
+
+# Closing speeds of which neither is greater: a unit normal good to 4 u in each part, three products and two sums.
+SPEED_ROUNDING = 32.0 * 2.0**-53
+
+# Planes are drawn through a polygon and followed beyond it: what its corners are off counts so many times more.
+PLANE_REACH = 4.0
+
+
+def common_plane(
+    pairs: Sequence[tuple[FloatArray, FloatArray]],
+    places: FloatArray,
+    normals: FloatArray,
+    velocity: FloatArray,
+    slack: float,
+) -> FloatArray:
+    """Unit normal of planes that have, through each place, one piece of a pair below them and the other above; or NaN.
+
+    Of several it is that along which the bodies approach fastest.  Looked at are the given normals of pairs, and planes
+    of triangles.
+    """
+    triangles = [piece for pair in pairs for piece in pair if len(piece) == 3]
+    faces = [np.cross(t[1] - t[0], t[2] - t[0]) for t in triangles]
+    lengths = [float(np.linalg.norm(n)) for n in faces]
+    units = [n / length for n, length in zip(faces, lengths, strict=True) if length > 0.0]
+    given = normals[~np.isnan(normals[:, 0])]
+    candidates = np.concatenate([given, *(np.stack([n, -n]) for n in units)])
+    candidates = candidates[np.sort(np.unique(candidates, axis=0, return_index=True)[1])]
+    for (below, above), place in zip(pairs, places, strict=True):
+        highest = ((below - place) @ candidates.T).max(axis=0)
+        lowest = ((above - place) @ candidates.T).min(axis=0)
+        candidates = candidates[(highest <= slack) & (lowest >= -slack)]
+    if not len(candidates):
+        return np.full(3, np.nan)
+    speed = candidates @ velocity
+    # The first of equals: the normals of pairs are sharper than those of small triangles.
+    best: FloatArray = 0.0 + candidates[int(np.argmax(speed >= speed.max() - SPEED_ROUNDING * np.abs(velocity).sum()))]
+    return best  # without -0.0
+
+
+def united_in_space(sets: Sequence[FloatArray], slack: float, normal: FloatArray) -> list[FloatArray]:
+    """Points, longest segments, and rings around areas, counter-clockwise about the normal; those of holes clockwise.
+
+    None is in another, and no seam is left of the polygons that make an area.
+    """
+    points: list[FloatArray] = []
+    segments: list[FloatArray] = []
+    polygons: list[FloatArray] = []
+    for part in sets:
+        ring = _ring(part, slack)
+        (points if len(ring) == 1 else segments if len(ring) == 2 else polygons).append(ring)
+    planes = _planes(polygons, slack)
+    rings = [ring for plane in planes for ring in plane.rings(slack, normal)]
+    bare = [piece for s in _joined(segments, slack) for piece in _uncovered(s, planes, slack)]
+    lone: list[FloatArray] = []
+    for p in points:
+        near = any(np.abs(p - q).max() <= slack for q in lone)
+        if (
+            not near
+            and not any(_beside(s, p[0], slack) for s in bare)
+            and not any(x.holds(p[0], slack) for x in planes)
+        ):
+            lone.append(p)
+    order = sorted([*lone, *bare], key=lambda part: (len(part), part.tolist()))
+    return [*order, *rings]
+
+
+def _ring(points: FloatArray, slack: float) -> FloatArray:
+    """Corners of a convex polygon in order, two ends, or a point; of points that span no more than that."""
+    kept = [p for i, p in enumerate(points) if not any(np.abs(p - q).max() <= slack for q in points[:i])]
+    if len(kept) < 3:
+        return np.array(kept)
+    corners = np.array(kept)
+    arm = corners[np.argmax(np.linalg.norm(corners - corners[0], axis=1))] - corners[0]
+    across = np.cross(arm, corners - corners[0])
+    k = int(np.argmax(np.linalg.norm(across, axis=1)))
+    length = float(np.linalg.norm(across[k]))
+    if length <= slack * float(np.linalg.norm(arm)):
+        along = corners @ arm
+        return corners[[int(np.argmin(along)), int(np.argmax(along))]]
+    middle = corners.mean(axis=0)
+    u = arm / np.linalg.norm(arm)
+    v = np.cross(across[k] / length, u)
+    angles = np.arctan2((corners - middle) @ v, (corners - middle) @ u)
+    ordered: FloatArray = corners[np.argsort(angles)]
+    # As it came if it came in that order.
+    turns = np.roll(angles, -1) - angles
+    return corners if (turns > 0).sum() == len(turns) - 1 or (turns < 0).sum() == len(turns) - 1 else ordered
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """Convex polygons in one plane."""
+
+    middle: FloatArray
+    u: FloatArray
+    v: FloatArray
+    size: float
+    polygons: list[FloatArray]
+
+    @property
+    def normal(self) -> FloatArray:
+        return np.cross(self.u, self.v)
+
+    def flat(self, points: FloatArray) -> FloatArray:
+        return np.column_stack([(points - self.middle) @ self.u, (points - self.middle) @ self.v])
+
+    def contains(self, points: FloatArray, slack: float) -> bool:
+        """Whether all are in the plane."""
+        arms = points - self.middle
+        room = slack * (1.0 + PLANE_REACH * np.linalg.norm(arms, axis=1) / self.size)
+        return bool((np.abs(arms @ self.normal) <= room).all())
+
+    def heights(self, polygon: FloatArray, at: FloatArray) -> FloatArray:
+        """(n, edges): how far points (n, 2) are inside of every edge."""
+        ring = self.flat(polygon)
+        way = np.roll(ring, -1, axis=0) - ring
+        if _area(ring) < 0.0:
+            way = -way
+        way = way / np.linalg.norm(way, axis=1, keepdims=True)
+        height: FloatArray = way[:, 0] * (at[:, None, 1] - ring[:, 1]) - way[:, 1] * (at[:, None, 0] - ring[:, 0])
+        return height
+
+    def holds(self, p: FloatArray, slack: float) -> bool:
+        if not self.contains(p[None], slack):
+            return False
+        at = self.flat(p[None])
+        return any(bool((self.heights(polygon, at) >= -slack).all()) for polygon in self.polygons)
+
+    def rings(self, slack: float, normal: FloatArray) -> Iterator[FloatArray]:
+        """Around all that is in some polygon."""
+        up = self.normal
+        wanted = normal if not np.isnan(normal[0]) else up * np.sign(up[np.argmax(np.abs(up))])
+        turned = float(up @ wanted) < 0.0
+        for ring in _around(self, slack) if len(self.polygons) > 1 else self.polygons:
+            flip = _area(self.flat(ring)) < 0.0 if len(self.polygons) == 1 else False
+            yield ring[::-1] if flip != turned else ring
+
+
+def _planes(polygons: Sequence[FloatArray], slack: float) -> list[_Plane]:
+    """Polygons by their planes, which are drawn through the largest."""
+    planes: list[_Plane] = []
+    measured = []
+    for ring in polygons:
+        normal = np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
+        measured.append((float(np.linalg.norm(normal)), normal))
+    for k in sorted(range(len(polygons)), key=lambda k: -measured[k][0]):
+        ring, (area, normal) = polygons[k], measured[k]
+        for plane in planes:
+            if plane.contains(ring, slack):
+                plane.polygons.append(ring)
+                break
+        else:
+            middle = ring.mean(axis=0)
+            arms = ring - middle
+            arm = arms[np.argmax(np.linalg.norm(arms, axis=1))]
+            size = float(np.linalg.norm(arm))
+            u, n = arm / size, normal / area
+            v = np.cross(n, u)
+            planes.append(_Plane(middle, u, v / np.linalg.norm(v), area / size, [ring]))
+    return planes
+
+
+def _around(plane: _Plane, slack: float) -> Iterator[FloatArray]:
+    """Borders of the union, the inside at their left as seen from the tip of the plane's normal."""
+    rings = [ring if _area(plane.flat(ring)) > 0.0 else ring[::-1] for ring in plane.polygons]
+    points = np.concatenate(rings)
+    places = plane.flat(points)
+    first = _same(places, slack)
+    ends = np.cumsum([0, *map(len, rings)])
+    edges = np.concatenate(
+        [np.column_stack([first[i:j], np.roll(first[i:j], -1)]) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+    )
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    crossings, at = _crossings(places, edges, points, slack)
+    if len(crossings):  # of polygons that overlap
+        points, places = np.concatenate([points, at]), np.concatenate([places, crossings])
+        first = _same(places, slack)
+    edges = _split(places, edges, np.unique(first), slack)
+    edges = np.unique(edges, axis=0)
+    known = {(u, v) for u, v in edges.tolist()}
+    lines = np.unique(np.sort(edges, axis=1), axis=0)
+    middles = 0.5 * (places[lines[:, 0]] + places[lines[:, 1]])
+    covered = np.zeros(len(lines), np.bool_)
+    for ring in rings:
+        covered |= (plane.heights(ring, middles) > slack).all(axis=1)
+    border = []
+    for (u, v), inside in zip(lines.tolist(), covered.tolist(), strict=True):
+        left, right = (u, v) in known, (v, u) in known
+        if not inside and left != right:
+            border.append((u, v) if left else (v, u))
+    for chain in _chains(border, places):
+        kept = _without_flat(chain, places, slack)
+        if len(kept) > 2:
+            yield points[kept]
+
+
+def _same(places: FloatArray, slack: float) -> IntArray:
+    """For every place the first one that is the same."""
+    close = (np.abs(places[:, None] - places[None]) <= slack).all(axis=2)
+    first: IntArray = np.argmax(close, axis=1)
+    return first[first]
+
+
+def _crossings(places: FloatArray, edges: IntArray, points: FloatArray, slack: float) -> tuple[FloatArray, FloatArray]:
+    """Where edges cross each other that end elsewhere."""
+    start, way = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
+    length = np.linalg.norm(way, axis=1)
+    unit = way / length[:, None]
+    from_start = unit[:, None, 0] * (start[None, :, 1] - start[:, None, 1]) - unit[:, None, 1] * (
+        start[None, :, 0] - start[:, None, 0]
+    )
+    end = start + way
+    from_end = unit[:, None, 0] * (end[None, :, 1] - start[:, None, 1]) - unit[:, None, 1] * (
+        end[None, :, 0] - start[:, None, 0]
+    )
+    apart = (from_start > slack) & (from_end < -slack) | (from_start < -slack) & (from_end > slack)
+    one, two = np.nonzero(np.triu(apart & apart.T))
+    part = from_start[one, two] / (from_start[one, two] - from_end[one, two])
+    at = points[edges[two, 0]] + part[:, None] * (points[edges[two, 1]] - points[edges[two, 0]])
+    return start[two] + part[:, None] * way[two], at
+
+
+def _split(places: FloatArray, edges: IntArray, corners: IntArray, slack: float) -> IntArray:
+    """Edges, cut where corners are on them."""
+    start, way = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
+    length = np.linalg.norm(way, axis=1)
+    unit = way / length[:, None]
+    arms = places[corners][None] - start[:, None]
+    along = (arms * unit[:, None]).sum(axis=2)
+    across = unit[:, None, 0] * arms[:, :, 1] - unit[:, None, 1] * arms[:, :, 0]
+    on = (np.abs(across) <= slack) & (along > slack) & (along < length[:, None] - slack)
+    cut = []
+    for k, (u, v) in enumerate(edges.tolist()):
+        between = np.flatnonzero(on[k])
+        stops = [u, *corners[between[np.argsort(along[k, between])]].tolist(), v]
+        cut += [(x, y) for x, y in zip(stops[:-1], stops[1:], strict=True) if x != y]
+    return np.array(cut, np.int64).reshape(-1, 2)
+
+
+def _chains(border: Sequence[tuple[int, int]], places: FloatArray) -> Iterator[list[int]]:
+    """Rings: where several go on from a corner, that which has nothing between it and the way come from."""
+    onward: dict[int, list[int]] = {}
+    for u, v in border:
+        onward.setdefault(u, []).append(v)
+    for begin in sorted(onward):
+        while onward[begin]:
+            ring, here = [begin], onward[begin].pop()
+            while here != begin and onward.get(here):
+                back = places[ring[-1]] - places[here]
+                turn = [
+                    np.arctan2(back[1], back[0]) - np.arctan2(*(places[x] - places[here])[::-1]) for x in onward[here]
+                ]
+                ring.append(here)
+                here = onward[here].pop(int(np.argmin(np.mod(turn, 2.0 * np.pi))))
+            if here == begin:
+                yield ring
+
+
+def _without_flat(ring: list[int], places: FloatArray, slack: float) -> list[int]:
+    """Without corners on the line between their neighbours."""
+    kept = list(ring)
+    k = 0
+    while k < len(kept) and len(kept) > 2:
+        before, at, after = (places[kept[(k + step) % len(kept)]] for step in (-1, 0, 1))
+        way = after - before
+        height = abs(way[0] * (at - before)[1] - way[1] * (at - before)[0])
+        if height <= slack * float(np.linalg.norm(way)):
+            del kept[k]
+            k = max(k - 1, 0)
+        else:
+            k += 1
+    return kept
+
+
+def _area(ring: FloatArray) -> float:
+    """Twice it; > 0 for counter-clockwise ones."""
+    after = np.roll(ring, -1, axis=0)
+    return float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum())
+
+
+def _joined(segments: Sequence[FloatArray], slack: float) -> list[FloatArray]:
+    """The longest ones: those on one line that overlap or adjoin are one."""
+    left = sorted(segments, key=lambda s: float(np.linalg.norm(s[1] - s[0])))
+    whole: list[FloatArray] = []
+    while left:
+        s = left.pop()
+        others = np.array([*left, *whole]).reshape(-1, 2, 3)
+        mates = _mates(s, others, slack)
+        if not mates.any():
+            whole.append(s)
+            continue
+        ends = np.concatenate([s, *others[mates]])
+        along = ends @ (s[1] - s[0])
+        count = len(left)
+        left = [x for x, mate in zip(left, mates[:count], strict=True) if not mate]
+        whole = [x for x, mate in zip(whole, mates[count:], strict=True) if not mate]
+        left.append(ends[[int(np.argmin(along)), int(np.argmax(along))]])
+    return whole
+
+
+def _mates(s: FloatArray, others: FloatArray, slack: float) -> BoolArray:
+    """Which are on the line of a segment, and meet it; or it is on theirs, if they are longer."""
+    way = s[1] - s[0]
+    length = float(np.linalg.norm(way))
+    arms = others - s[0]
+    along = arms @ (way / length)
+    off = np.linalg.norm(arms - along[:, :, None] * (way / length), axis=2).max(axis=1)
+    longer = np.maximum(np.linalg.norm(others[:, 1] - others[:, 0], axis=1) / length, 1.0)
+    mates: BoolArray = (off <= slack * longer) & (along.min(axis=1) <= length + slack) & (along.max(axis=1) >= -slack)
+    return mates
+
+
+def _uncovered(s: FloatArray, planes: Sequence[_Plane], slack: float) -> Iterator[FloatArray]:
+    """What of a segment is in no polygon."""
+    way = s[1] - s[0]
+    length = float(np.linalg.norm(way))
+    hidden = []
+    for plane in planes:
+        if not plane.contains(s, slack):
+            continue
+        for polygon in plane.polygons:
+            heights = plane.heights(polygon, plane.flat(s)) + slack
+            if ((heights < 0.0).all(axis=0)).any():
+                continue
+            drop = heights[0] - heights[1]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = heights[0] / drop
+            low = np.where(heights[0] < 0.0, at, 0.0).max()
+            high = np.where(heights[1] < 0.0, at, 1.0).min()
+            if low < high:
+                hidden.append((float(low), float(high)))
+    reached = 0.0
+    for low, high in [*sorted(hidden), (1.0, 1.0)]:
+        if (low - reached) * length > 2.0 * slack:
+            yield np.array([s[0] + reached * way, s[1] if low == 1.0 else s[0] + low * way])
+        reached = max(reached, high)
+
+
+def _beside(s: FloatArray, p: FloatArray, slack: float) -> bool:
+    way = s[1] - s[0]
+    part = float(np.clip(way @ (p - s[0]) / (way @ way), 0.0, 1.0))
+    return bool(np.abs(s[0] + part * way - p).max() <= slack)
