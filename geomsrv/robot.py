@@ -25,6 +25,8 @@ from geomsrv.shapes import Box, Convex, Cylinder, Mesh, Shape, Sphere
 
 __all__ = ["Robot", "example_robot_directory"]
 
+_Twist = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 
 @dataclass(frozen=True)
 class _Collision:
@@ -100,33 +102,74 @@ class Robot:
         return [c.id for c in self._collisions]
 
     def objects(
-        self, joints: Mapping[str, float], *, base: NDArray[np.float64] | None = None, frame: str = ""
+        self,
+        joints: Mapping[str, float],
+        *,
+        velocities: Mapping[str, float] | None = None,
+        base: NDArray[np.float64] | None = None,
+        frame: str = "",
     ) -> list[SceneObject]:
-        """Scene objects at a joint configuration.
+        """Scene objects at a joint configuration, and on their way if the joints are.
+
+        An object of a scene turns about the origin of its pose.  That of a hull that turns is put on its screw axis, so
+        that it moves as the link does for as long as the link's spatial twist stays the same, which is for good where
+        one joint moves; a box that turns becomes such a hull.  Round shapes turn about their centre: their motion is
+        right to first order.
 
         Parameters
         ----------
         joints : mapping of str to float
             Joint positions [rad or m]; joints left out are at 0.
+        velocities : mapping of str to float, optional
+            Joint velocities [rad/s or m/s]; joints left out are at rest.
         base : (4, 4) float, optional
             Pose of the robot's root link in `frame`.
         frame : str
             Frame that the poses are in; empty is the scene's fixed frame.
         """
-        unknown = set(joints) - set(self.joint_names)
-        if unknown:
-            raise GeometryError(f"joints: unknown joint {min(unknown)!r}; the robot has {', '.join(self.joint_names)}")
+        rates = velocities or {}
+        for name, given in (("joints", joints), ("velocities", rates)):
+            if unknown := set(given) - set(self.joint_names):
+                known = ", ".join(self.joint_names)
+                raise GeometryError(f"{name}: unknown joint {min(unknown)!r}; the robot has {known}")
         self._model.update_cfg({name: float(joints.get(name, 0.0)) for name in self.joint_names})
         root = np.eye(4) if base is None else np.asarray(base, np.float64)
-        return [
-            SceneObject(
-                id=c.id,
-                shape=c.shape,
-                pose=_pose(root @ self._model.get_transform(c.link) @ c.X_link_shape),
-                frame=frame,
-            )
-            for c in self._collisions
-        ]
+        twists = self._twists(root, rates)
+        objects = []
+        for c in self._collisions:
+            shape, place = c.shape, root @ self._model.get_transform(c.link) @ c.X_link_shape
+            angular, at_origin = twists[c.link]
+            if isinstance(shape, Box | Convex) and angular.any():
+                on_axis = _nearest_on_axis(angular, at_origin, place[:3, 3])
+                shape = Convex(_vertices(shape) + (place[:3, 3] - on_axis) @ place[:3, :3])
+                place[:3, 3] = on_axis
+            linear = at_origin + np.cross(angular, place[:3, 3])
+            objects.append(SceneObject(c.id, shape, _pose(place), (*linear, *angular), frame))
+        return objects
+
+    def _twists(self, root: NDArray[np.float64], rates: Mapping[str, float]) -> dict[str, _Twist]:
+        """Of every link the angular velocity, and the linear one of what of it is at the frame's origin."""
+        model = self._model
+        parents = {joint.child: joint for joint in model.joint_map.values()}
+        found: dict[str, _Twist] = {model.base_link: (np.zeros(3), np.zeros(3))}
+
+        def of(link: str) -> _Twist:
+            if link not in found:
+                joint = parents[link]
+                angular, linear = of(joint.parent)
+                rate = rates.get(joint.name, 0.0)
+                if joint.mimic is not None:
+                    rate = joint.mimic.multiplier * rates.get(joint.mimic.joint, 0.0)
+                place = root @ model.get_transform(link)
+                along = float(rate) * (place[:3, :3] @ np.asarray(joint.axis, np.float64))
+                if joint.type == "prismatic":
+                    linear = linear + along
+                elif joint.type in ("revolute", "continuous"):
+                    angular, linear = angular + along, linear - np.cross(along, place[:3, 3])
+                found[link] = angular, linear
+            return found[link]
+
+        return {link: of(link) for link in model.link_map}
 
     def _shape(self, link: str, geometry: Any) -> Shape:
         if geometry.box is not None:
@@ -172,6 +215,22 @@ def example_robot_directory() -> Path:
             "example robots need the package example-robot-data: pip install example-robot-data"
         ) from None
     return Path(str(distribution.locate_file("cmeel.prefix/share/example-robot-data")))
+
+
+def _vertices(shape: Box | Convex) -> NDArray[np.float64]:
+    if isinstance(shape, Convex):
+        return shape.vertices
+    return np.array(list(product((-1.0, 1.0), repeat=3))) * shape.half_extents
+
+
+def _nearest_on_axis(
+    angular: NDArray[np.float64], at_origin: NDArray[np.float64], point: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Point of a twist's screw axis, along which all that is on it moves, that is nearest to `point`."""
+    square = angular @ angular
+    foot = np.cross(angular, at_origin) / square
+    nearest: NDArray[np.float64] = foot + ((point - foot) @ angular / square) * angular
+    return nearest
 
 
 def _import(name: str) -> Any:
