@@ -1,6 +1,6 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo's world: a Panda on a table with objects, a camera, and mobile robots on the floor.  Data only."""
+"""The demo's world: a Panda swinging over a table with objects, a camera, a mobile robot on the floor.  Data only."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ JOINTS = {
     "panda_joint7": 0.785,
     "panda_finger_joint1": 0.02,
 }
+#: The arm swings about its vertical axis [rad/s].
+SWING = {"panda_joint1": 0.4}
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 # Quarter turn about y: the capsule's axis lies along x.
 LYING = (0.0, float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)))
@@ -62,16 +64,41 @@ def _regular(x: float, y: float, radius: float, sides: int) -> np.ndarray:
     return np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
 
 
-#: The footprint stands still; a cart comes flat against its side, a pallet corner-first, a person walks past.
+#: A cart comes towards the robot, a pallet flat against a dock, a person walks by.
 MOVERS = (
-    Mover(1, "footprint", _rectangle(0.0, 0.0, 0.5, 0.35), (0.0, 0.0)),
-    Mover(2, "cart", _rectangle(2.4, 0.2, 0.4, 0.3), (-0.8, 0.0)),
-    Mover(3, "pallet", _rectangle(-1.4, -1.5, 0.45, 0.3, 0.6), (0.5, 0.55)),
-    Mover(4, "person", _regular(-1.2, 1.5, 0.25, 12), (1.0, -0.1)),
+    Mover(1, "dock", _rectangle(-1.6, 1.2, 0.5, 0.2), (0.0, 0.0)),
+    Mover(2, "cart", _rectangle(2.4, 0.5, 0.4, 0.3), (-0.4, 0.0)),
+    Mover(3, "pallet", _rectangle(-1.5, -0.6, 0.35, 0.25), (0.0, 0.7)),
+    Mover(4, "person", _regular(-0.3, -1.3, 0.25, 12), (0.6, -0.05)),
 )
 
-#: What the movers are called here, by their id in the scene.
+# A mobile robot on an arc: its velocities ahead and about the vertical axis, and its footprint, x ahead.
+FOOTPRINT = "footprint"
+DRIVE, YAW_RATE = 0.5, 0.5  # [m/s], [rad/s]
+FOOTPRINT_RING = _rectangle(0.0, 0.0, 0.5, 0.35)
+TURN_CENTER = np.array([0.0, DRIVE / YAW_RATE])  # which it drives around
+
+#: What is called otherwise here than in the scene, by its id there.
 NAMES = {mover.id: mover.name for mover in MOVERS}
+IN_THE_PLANE = {*NAMES, FOOTPRINT}
+
+
+def driving(t: float = 0.0) -> np.ndarray:
+    """The footprint after `t` seconds."""
+    c, s = np.cos(YAW_RATE * t), np.sin(YAW_RATE * t)
+    return (FOOTPRINT_RING - TURN_CENTER) @ np.array([[c, s], [-s, c]]) + TURN_CENTER
+
+
+def footprint() -> gs.SceneObject:
+    """The mobile robot: an object turns about the origin of its pose, which is put where the arc has its centre."""
+    ring = gs.Polygon(FOOTPRINT_RING - TURN_CENTER)
+    return gs.SceneObject(FOOTPRINT, ring, (*TURN_CENTER, 0.0, *UPRIGHT), (0.0, 0.0, 0.0, 0.0, 0.0, YAW_RATE))
+
+
+def scan() -> np.ndarray:
+    """(n, 2) points of a laser scan: a wall, as the robot sees it, to some millimetres."""
+    x = np.linspace(-1.9, 2.3, 64)
+    return np.column_stack([x, 2.15 + 0.1 * x + 0.004 * np.sin(37.0 * x)])
 
 
 def robot() -> Robot:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # noq
 import geomsrv as gs  # noqa: E402
 
 INSIDE, PARTLY, UNSEEN, MOVING = "#2a9d8f", "#e9c46a", "#c9c9c9", "#6d597a"
-VIEW, CONTACT, NEAREST = "#1d6fb8", "#d62828", "#111111"
+VIEW, CONTACT, NEAREST, SWUNG = "#1d6fb8", "#d62828", "#111111", "#8a1c7c"
 BODIES = ("#4d6cfa", "#f3722c", "#43aa8b", "#9b5de5", "#577590")
 
 
@@ -46,8 +46,12 @@ class Picture:
     frustum: gs.Frustum
     nearest: tuple[np.ndarray, np.ndarray, str] | None = None  #: the two points and a label
     touching: Sequence[np.ndarray] = ()  #: contact points in 3D
-    footprints: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)  #: id -> ring, velocity
+    swung: Sequence[gs.SceneObject] = ()  #: the arm where it will touch
+    swing: tuple[np.ndarray, np.ndarray, str] | None = None  #: contact points (k, 3), normal, and a label
+    footprints: Mapping[str, Callable[[float], np.ndarray]] = field(default_factory=dict)  #: id -> ring at a time
     planned: Sequence[PlannedContact] = ()
+    scan: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  #: (n, 2)
+    collision: PlannedContact | None = None  #: of the robot with the scan
 
 
 def _mesh(shape: gs.Shape) -> trimesh.Trimesh | None:
@@ -97,10 +101,19 @@ def _draw_cell(axes: plt.Axes, picture: Picture) -> None:
         a, b, label = picture.nearest
         axes.plot(*np.array([a, b]).T, color=NEAREST, linewidth=2.5, marker="o", markersize=4, zorder=6)
         nearest = f"nearest: {label}"
+    for item in picture.swung:
+        if (mesh := _mesh(item.shape)) is not None:
+            triangles = _placed(item, mesh.vertices)[mesh.faces]
+            axes.add_collection3d(Poly3DCollection(triangles, facecolors=SWUNG, alpha=0.3, zorder=1.5))
     for point in picture.touching:
         axes.scatter(*point, color=CONTACT, s=30, depthshade=False, zorder=7)
+    swing = "first contact of the arm"
+    if picture.swing is not None:
+        points, normal, swing = picture.swing
+        axes.scatter(*points.T, color=SWUNG, marker="D", s=36, depthshade=False, zorder=8)
+        axes.quiver(*points.mean(axis=0), *(0.25 * normal), color=SWUNG, linewidth=2.0, zorder=8)
     axes.set(xlim=(-0.5, 1.8), ylim=(-1.0, 1.0), zlim=(-0.75, 1.1), xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
-    axes.set_box_aspect((2.3, 2.0, 1.85), zoom=1.15)
+    axes.set_box_aspect((2.3, 2.0, 1.85), zoom=1.1)
     axes.view_init(elev=22, azim=-112)
     axes.legend(
         handles=[
@@ -110,54 +123,38 @@ def _draw_cell(axes: plt.Axes, picture: Picture) -> None:
             Line2D([], [], color=VIEW, marker="s", markersize=4, label="camera and its frustum"),
             Line2D([], [], color=NEAREST, marker="o", markersize=4, label=nearest),
             Line2D([], [], color=CONTACT, marker="o", linestyle="", label="contact now"),
+            Line2D([], [], color=SWUNG, marker="D", markersize=5, label=swing),
         ],
-        loc="upper left",
+        loc="upper center",
+        ncols=2,
         fontsize=8,
         framealpha=0.9,
     )
 
 
 def _draw_plan(axes: plt.Axes, picture: Picture) -> None:
-    for (name, (ring, velocity)), color in zip(picture.footprints.items(), BODIES, strict=False):
+    contacts = [*picture.planned, *([picture.collision] if picture.collision is not None else [])]
+    for (name, at), color in zip(picture.footprints.items(), BODIES, strict=False):
+        ring = at(0.0)
         axes.add_patch(Polygon(ring, closed=True, facecolor=color, alpha=0.55, edgecolor=color))
         center = ring.mean(axis=0)
-        axes.annotate(name, center, ha="center", va="center", fontsize=7, zorder=5)
-        if np.any(velocity):
-            for time in [c.time for c in picture.planned if name in (c.id_a, c.id_b)]:
-                axes.add_patch(
-                    Polygon(ring + velocity * time, closed=True, fill=False, linestyle="--", edgecolor=color)
-                )
-            axes.annotate(
-                "",
-                center + 0.5 * velocity,
-                center,
-                arrowprops={"arrowstyle": "->", "color": color, "linewidth": 1.8},
-            )
-    for contact in picture.planned:
-        axes.plot(
-            *contact.points.T,
-            color=CONTACT,
-            marker="o",
-            markersize=5,
-            linewidth=3,
-            solid_capstyle="round",
-            zorder=8,
-        )
+        axes.annotate(name, center, xytext=(0, -12), textcoords="offset points", ha="center", fontsize=7, zorder=5)
+        for time in [c.time for c in contacts if name in (c.id_a, c.id_b)]:
+            axes.add_patch(Polygon(at(time), closed=True, fill=False, linestyle="--", edgecolor=color))
+        way = np.array([at(time).mean(axis=0) for time in np.linspace(0.0, 1.0, 12)])
+        if np.ptp(way, axis=0).any():
+            axes.plot(*way.T, color=color, linewidth=1.8)
+            arrow = {"arrowstyle": "->", "color": color, "linewidth": 1.8}
+            axes.annotate("", way[-1] + (way[-1] - way[-2]), way[-2], arrowprops=arrow)
+    axes.plot(*picture.scan.T, color=NEAREST, marker=".", markersize=3, linestyle="")
+    for contact in contacts:
+        axes.plot(*contact.points.T, color=CONTACT, marker="o", markersize=5, linewidth=3, zorder=8)
         middle = contact.points.mean(axis=0)
+        if not np.isnan(contact.normal).any():
+            arrow = {"arrowstyle": "->", "color": CONTACT}
+            axes.annotate("", middle + 0.35 * contact.normal, middle, arrowprops=arrow, zorder=8)
         axes.annotate(
-            "",
-            middle + 0.35 * contact.normal,
-            middle,
-            arrowprops={"arrowstyle": "->", "color": CONTACT},
-            zorder=8,
-        )
-        axes.annotate(
-            f"{contact.time:.2f} s",
-            middle,
-            xytext=(8, -14),
-            textcoords="offset points",
-            color=CONTACT,
-            fontsize=9,
+            f"{contact.time:.2f} s", middle, xytext=(8, -14), textcoords="offset points", color=CONTACT, fontsize=9
         )
     axes.autoscale_view()
     axes.margins(0.08)
@@ -167,8 +164,10 @@ def _draw_plan(axes: plt.Axes, picture: Picture) -> None:
     axes.legend(
         handles=[
             Patch(facecolor=BODIES[0], alpha=0.55, label="body now"),
+            Line2D([], [], color=BODIES[0], linewidth=1.8, label="its way in the next second"),
             Line2D([], [], color=BODIES[0], linestyle="--", label="body at first contact"),
             Line2D([], [], color=CONTACT, marker="o", label="contact set and normal"),
+            Line2D([], [], color=NEAREST, marker=".", linestyle="", label="laser scan"),
         ],
         loc="best",
         fontsize=8,
@@ -180,8 +179,8 @@ def draw(picture: Picture, path: Path) -> None:
     figure = plt.figure(figsize=(14, 6.6), layout="constrained")
     grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
     cell, plan = figure.add_subplot(grid[0], projection="3d"), figure.add_subplot(grid[1])
-    cell.set_title("what the camera sees, what is near, what touches")
-    plan.set_title("who touches whom, when and where")
+    cell.set_title("what the camera sees, what is near, what touches, what the swinging arm will hit")
+    plan.set_title("a robot on an arc: who touches whom, when and where")
     _draw_cell(cell, picture)
     _draw_plan(plan, picture)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""Demo: a geomsrv node in one process, this client in another, a Panda on a table between them.
+"""Demo: a geomsrv node in one process, this client in another, a Panda swinging over a table between them.
 
 Publishes the world, streams a moving obstacle, polygons and a camera, asks the node the three questions, listens to
 its topics, prints what it answered and writes a picture.  Exit status 0 only if every answer arrived, agrees with what
@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +43,14 @@ from std_srvs.srv import Trigger  # noqa: E402
 import geomsrv as gs  # noqa: E402
 from geomsrv import msg as gm  # noqa: E402
 from geomsrv import srv as gv  # noqa: E402
+from geomsrv.robot import Robot  # noqa: E402
 from geomsrv.ros import convert  # noqa: E402
 
 ANSWER_DEADLINE_S = 20.0
 HORIZON_S = 5.0
 MAX_DISTANCE_M = 0.5
 TIMED_CALLS = 50
+SURELY_S = 1e-5  # much longer than the time in which a contact is proven, and than what rounding moves it by
 LATCHED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -290,7 +293,7 @@ def show_contacts(console: Console, response: Any) -> list[picture.PlannedContac
         points = np.reshape(response.points, (-1, 3))[begin:end]
         where = "  ".join(f"({x:.3f}, {y:.3f}, {z:.3f})" for x, y, z in points[:2])
         width = response.time_upper[i] - response.time_lower[i]
-        if status == gs.WILL_TOUCH or names.keys() & {a, b}:
+        if status == gs.WILL_TOUCH or cell.IN_THE_PLANE & {a, b}:
             table.add_row(
                 f"{names.get(a, a)} - {names.get(b, b)}",
                 status.name,
@@ -298,13 +301,63 @@ def show_contacts(console: Console, response: Any) -> list[picture.PlannedContac
                 f"{width:.1e}",
                 where,
             )
-        if status == gs.WILL_TOUCH and {a, b} <= names.keys():
+        if status == gs.WILL_TOUCH and {a, b} <= cell.IN_THE_PLANE:
             normal = np.asarray(response.normal[3 * i : 3 * i + 2])
-            planned.append(picture.PlannedContact(names[a], names[b], response.time[i], points[:, :2], normal))
+            planned.append(
+                picture.PlannedContact(names.get(a, a), names.get(b, b), response.time[i], points[:, :2], normal)
+            )
     console.print(table)
     if response.message:
         console.print(f"Named by the node: {response.message}\n")
     return planned
+
+
+@dataclass(frozen=True)
+class Swing:
+    """First contact of the swinging arm."""
+
+    link: str
+    other: str
+    time: tuple[float, float, float]  #: time, lower, upper [s]
+    points: np.ndarray  #: (k, 3) [m]
+    normal: np.ndarray  #: (3,)
+
+
+def first_of_the_arm(response: Any, ours: set[str]) -> Swing:
+    """The first contact of a link with what is no link, as the node told."""
+    for i, (a, b) in enumerate(zip(response.ids_a, response.ids_b, strict=True)):
+        if response.item_status[i] == gs.WILL_TOUCH and len({a, b} & ours) == 1:
+            begin, end = response.point_offsets[i], response.point_offsets[i + 1]
+            link, other = (a, b) if a in ours else (b, a)
+            return Swing(
+                link,
+                other,
+                (response.time[i], response.time_lower[i], response.time_upper[i]),
+                np.reshape(response.points, (-1, 3))[begin:end],
+                np.asarray(response.normal[3 * i : 3 * i + 3]),
+            )
+    raise DemoFailure("the swinging arm must hit something")
+
+
+def show_motion(console: Console, swing: Swing) -> picture.PlannedContact:
+    """What the arm and the robot on its arc will hit first; returns the robot's collision with the scan."""
+    at, lower, upper = swing.time
+    x, y, z = swing.points.mean(axis=0)
+    console.print(
+        f"Arm swinging at {cell.SWING['panda_joint1']:g} rad/s: {swing.link} hits {swing.other} after {at:.6f} s"
+        f" (proven to {upper - lower:.1e} s) at ({x:.3f}, {y:.3f}, {z:.3f})"
+    )
+    scan = cell.scan()
+    ahead = gs.time_to_collision(cell.FOOTPRINT_RING, (cell.DRIVE, 0.0, cell.YAW_RATE), scan)
+    if ahead.first < 0:
+        raise DemoFailure("the robot must hit the wall that it scans")
+    point = scan[ahead.first]
+    console.print(
+        f"Robot on an arc of {cell.DRIVE / cell.YAW_RATE:g} m: hits the scanned wall after {ahead.earliest:.6f} s"
+        f" (proven to {ahead.earliest_upper - ahead.earliest:.1e} s) at ({point[0]:.3f}, {point[1]:.3f})\n"
+    )
+    nowhere = np.full(2, np.nan)
+    return picture.PlannedContact(cell.FOOTPRINT, "scan", ahead.earliest, point[None], nowhere)
 
 
 def show_cross_check(console: Console, state: Any) -> None:
@@ -322,8 +375,8 @@ def run(console: Console, path: Path) -> None:
     """The demo; raises DemoFailure where it does not get what it was promised."""
     start = time.perf_counter()
     panda = cell.robot()
-    links = panda.objects(cell.JOINTS)
-    furniture = cell.furniture()
+    links = panda.objects(cell.JOINTS, velocities=cell.SWING)
+    furniture = [*cell.furniture(), cell.footprint()]
     world = [*links, *furniture]
     allowed = cell.allowed_pairs(panda)
     vertices = sum(len(o.shape.vertices) for o in links if isinstance(o.shape, gs.Convex))
@@ -370,6 +423,8 @@ def run(console: Console, path: Path) -> None:
         show_visible(console, seen)
         nearest = show_distances(console, near, set(panda.ids))
         planned = show_contacts(console, meet)
+        swing = first_of_the_arm(meet, set(panda.ids))
+        collision = show_motion(console, swing)
         tally = client.wait_for(
             "state",
             "the cross-check's tally",
@@ -386,6 +441,7 @@ def run(console: Console, path: Path) -> None:
             f"Topics: {len(visible.ids)} visible, {len(contacts.contacts)} contacts; self check: {checks.message}"
         )
         judge(seen, near, planned, tally)
+        judge_motion(swing, panda, {item.id: item for item in world}, collision)
         points = np.reshape(near.point_a, (-1, 3)), np.reshape(near.point_b, (-1, 3))
         now = {item.id: item for item in convert.update_from(scene.scene).add}
         label = f"{near.ids_a[nearest]} - {near.ids_b[nearest]}, {1e3 * near.distance[nearest]:.1f} mm"
@@ -396,14 +452,17 @@ def run(console: Console, path: Path) -> None:
                 frustum=cell.camera_frustum(),
                 nearest=(points[0][nearest], points[1][nearest], label),
                 touching=[points[0][i] for i, d in enumerate(near.distance) if d <= 0.0],
-                footprints={
-                    mover.name: (
-                        now[mover.id].shape.vertices + now[mover.id].pose[:2],
-                        np.asarray(mover.velocity),
-                    )
-                    for mover in cell.MOVERS
-                },
+                swung=panda.objects(swung_joints(swing.time[0])),
+                swing=(
+                    swing.points,
+                    swing.normal,
+                    f"first contact of the arm: {swing.link} - {swing.other}, {swing.time[0]:.2f} s",
+                ),
+                footprints={cell.FOOTPRINT: cell.driving}
+                | {mover.name: moving(now[mover.id], mover.velocity) for mover in cell.MOVERS},
                 planned=planned,
+                scan=cell.scan(),
+                collision=collision,
             ),
             path,
         )
@@ -412,6 +471,17 @@ def run(console: Console, path: Path) -> None:
             stream.stop()
         client.close()
     console.print(f"Picture: {path}   total {time.perf_counter() - start:.1f} s")
+
+
+def swung_joints(t: float) -> dict[str, float]:
+    """The arm's joints after `t` seconds."""
+    return cell.JOINTS | {name: cell.JOINTS[name] + rate * t for name, rate in cell.SWING.items()}
+
+
+def moving(item: gs.SceneObject, velocity: tuple[float, float]) -> Callable[[float], np.ndarray]:
+    """Ring of a polygon in translation, at a time."""
+    ring = item.shape.vertices + item.pose[:2]
+    return lambda t: ring + np.multiply(velocity, t)
 
 
 def judge(seen: Any, near: Any, planned: Sequence[picture.PlannedContact], tally: Any) -> None:
@@ -428,10 +498,28 @@ def judge(seen: Any, near: Any, planned: Sequence[picture.PlannedContact], tally
             f"what stands on the table must touch it, and nothing else; got {sorted(map(sorted, touching))}"
         )
     meetings = {frozenset((contact.id_a, contact.id_b)): len(contact.points) for contact in planned}
-    if meetings.get(frozenset(("cart", "footprint"))) != 2 or meetings.get(frozenset(("pallet", "footprint"))) != 1:
-        raise DemoFailure(f"the cart must meet the footprint along an edge, the pallet in a point; got {meetings}")
+    if meetings.get(frozenset(("pallet", "dock"))) != 2 or meetings.get(frozenset(("cart", cell.FOOTPRINT))) != 1:
+        raise DemoFailure(f"the pallet must meet the dock along an edge, the cart the robot in a point; got {meetings}")
     if tally.cross_check_mode != "off" and sum(tally.cross_check_unexplained):
         raise DemoFailure(f"the cross-check found {sum(tally.cross_check_unexplained)} unexplained differences")
+
+
+def judge_motion(swing: Swing, panda: Robot, world: dict[str, gs.SceneObject], collision: Any) -> None:
+    """Times of first contact against another way to find them: the bodies put where they are just before and after."""
+    _, lower, upper = swing.time
+
+    def clearance(t: float) -> float:
+        link = next(item for item in panda.objects(swung_joints(t)) if item.id == swing.link)
+        scene = gs.Scene()
+        scene.apply(gs.SceneUpdate(add=[link, replace(world[swing.other], twist=(0.0,) * 6)]))
+        return float(scene.distances(np.inf, want=("penetration",)).distance[0])
+
+    if not (clearance(lower - SURELY_S) > 0.0 > clearance(upper + SURELY_S)):
+        raise DemoFailure(f"the arm does not touch {swing.other} between {lower} s and {upper} s")
+    for t, hits in ((collision.time - SURELY_S, False), (collision.time + SURELY_S, True)):
+        robot, points = gs.Polygons.from_list([cell.driving(t)]), [[p] for p in cell.scan()]
+        if bool(gs.intersects(robot, gs.Polygons.from_list(points)).value.any()) != hits:
+            raise DemoFailure(f"the robot does not reach the scanned wall after {collision.time} s")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

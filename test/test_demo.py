@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,4 +29,8 @@ def test_it_answers_and_draws(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Cross-check" in done.stdout and "checks passed" in done.stdout
+    # When and where, as the demo's own check by bodies put there has found, too.
+    said = " ".join(done.stdout.split())
+    assert re.search(r"panda_rightfinger/2 hits carton after 0\.789\d+ s \(proven to \d\.\de-0[789] s\)", said), said
+    assert re.search(r"hits the scanned wall after 4\.517\d+ s \(proven to \d\.\de-1\d s\) at \(0\.700, 2\.223\)", said)
     assert picture.read_bytes().startswith(b"\x89PNG")
