@@ -86,11 +86,16 @@ class FclSupervisor:
         process = self._process
         return None if process is None else process.pid
 
-    def ask(self, solids: list[tuple[Solid, Solid]], poses: FloatArray) -> NDArray[np.void]:
-        """One `fcl_worker.REPLY` per pair, poses of b in a (n, 7); outcomes include those of `NoReply`."""
+    def ask(
+        self, solids: list[tuple[Solid, Solid]], poses: FloatArray, steps: FloatArray | None = None
+    ) -> NDArray[np.void]:
+        """One `fcl_worker.REPLY` per pair, poses of b in a (n, 7); outcomes include those of `NoReply`.
+
+        With `steps` (n, 3), b moves by that much as seen from a.
+        """
         requests = np.zeros(len(solids), fcl_worker.REQUEST)
         requests["a"], requests["b"] = [a.number for a, _ in solids], [b.number for _, b in solids]
-        requests["pose"] = poses
+        requests["pose"], requests["step"] = poses, np.nan if steps is None else steps
         replies = np.zeros(len(solids), fcl_worker.REPLY)
         replies["distance"] = np.nan
         start, suspect = 0, -1

@@ -30,8 +30,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     verify = commands.add_parser("verify", help="prove recorded answers in exact arithmetic; needs no ROS")
     verify.add_argument("files", nargs="+", metavar="FILE", help="certificates as JSON, one a line")
 
-    crosscheck = commands.add_parser("crosscheck", help="hard cases through every tier and through FCL and Coal")
-    crosscheck.add_argument("--hard", action="store_true", required=True, help="the hard cases; needs no ROS")
+    crosscheck = commands.add_parser("crosscheck", help="our answers beside those of FCL and Coal; needs no ROS")
+    which = crosscheck.add_mutually_exclusive_group(required=True)
+    which.add_argument("--hard", action="store_true", help="the hard cases, at every tier")
+    which.add_argument("--motion", type=int, metavar="N", help="first contacts of N random moving bodies, through FCL")
     crosscheck.add_argument("--cases", type=Path, metavar="FILE", help="JSON lines, by default those installed")
     crosscheck.add_argument("--verbose", action="store_true", help="name every wrong answer of FCL and Coal, too")
 
@@ -55,6 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     command, rest = arguments[:1], arguments[1:]
     if not (command and command[0] in PASSED_ON):
         given = parser.parse_args(arguments)
+        if given.command == "crosscheck" and given.motion is not None:
+            return _crosscheck_motion(given.motion)
         if given.command == "crosscheck":
             return _crosscheck([given.cases] if given.cases else None, given.verbose)
         if given.command == "price":
@@ -106,6 +110,19 @@ def _crosscheck(files: Sequence[Path] | None, verbose: bool) -> int:
         if ours or verbose:
             print(f"{'WRONG ' if ours else ''}{line}")
     return 1 if report.engine_wrong else 0
+
+
+def _crosscheck_motion(count: int) -> int:
+    from geomsrv.motion_check import VERDICTS, cross_check_motion, random_scene
+
+    if count < 2:
+        print(f"geomsrv crosscheck: --motion must be at least 2, got {count}", file=sys.stderr)
+        return 2
+    tally = cross_check_motion(random_scene(0, count), 2.0)
+    for kind, counts in sorted(tally.kinds.items()):
+        print(f"{kind:16}" + "".join(f"  {counts[verdict]:6} {verdict}" for verdict in VERDICTS if counts[verdict]))
+    print(tally.summary())
+    return 1 if tally.total("engine_wrong") else 0
 
 
 def _price(given: argparse.Namespace) -> int:

@@ -6,7 +6,9 @@ Started as a script by `geomsrv._fcl_process`, so it loads neither the package n
 be lost: FCL can abort, hang or segfault, and whatever it does ends this process and nothing else.  Coal, which came
 from FCL, runs in the same way: the arguments are the time limit and the peer's name.
 
-Of FCL only ``collide()`` and the unsigned ``distance()`` are called.  Signed distance aborts (uncaught
+Of FCL only ``collide()``, the unsigned ``distance()``, and, for bodies that translate, ``continuousCollide()`` by
+conservative advancement are called; its other ways to follow a motion ignore rotation, or turn about a point that
+nobody has set.  Signed distance aborts (uncaught
 ``std::logic_error``), hangs (concentric spheres, coaxial capsules) and segfaults (half spaces); the unsigned
 distance of a half space segfaults, too, so half spaces get ``collide()`` only.
 
@@ -37,7 +39,8 @@ from numpy.typing import NDArray
 
 HEADER = struct.Struct("<cq")
 DEFINITION = struct.Struct("<q16s4d")  # id, kind, the four parameters of `geomsrv.shapes.pack`
-REQUEST = np.dtype([("a", "<i8"), ("b", "<i8"), ("pose", "<f8", 7)])
+# `step`: how far b moves as seen from a, in its frame; NaN: neither moves.
+REQUEST = np.dtype([("a", "<i8"), ("b", "<i8"), ("pose", "<f8", 7), ("step", "<f8", 3)])
 REPLY = np.dtype([("outcome", "u1"), ("distance", "<f8")])
 
 # Yields the processor to the process whose answers are checked; the check is never urgent.
@@ -47,8 +50,8 @@ NICENESS = 10
 class Outcome(IntEnum):
     """What became of one pair."""
 
-    APART = 0  #: the reply holds the distance, or NaN for half spaces
-    CONTACT = 1
+    APART = 0  #: the reply holds the distance, or NaN for half spaces and for bodies that move
+    CONTACT = 1  #: of bodies that move, the reply holds the share of the way at which it begins
     FAILED = 2  #: python-fcl raised, or answered NaN
 
 
@@ -101,6 +104,10 @@ class Peer:
         """Outcome and distance of one pair, b placed by `pose` in the frame of a."""
         raise NotImplementedError
 
+    def follow(self, a: int, b: int, pose: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[int, float]:
+        """Outcome and share of the way at first contact of one pair, b moving by `step` in the frame of a."""
+        raise NotImplementedError
+
 
 class Fcl(Peer):
     """FCL."""
@@ -112,6 +119,12 @@ class Fcl(Peer):
         self.module = fcl
         self.version = str(getattr(fcl, "__version__", "unknown"))
         self._unsigned = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=False)
+        self._continuous = fcl.ContinuousCollisionRequest(
+            num_max_iterations=1000,
+            toc_err=1e-6,
+            ccd_motion_type=fcl.CCDMotionType.CCDM_TRANS,
+            ccd_solver_type=fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT,
+        )
 
     def _made(self, kind: str, params: list[float], vertices: NDArray[np.float64]) -> Any:
         """An object that stays at the origin, and one that gets moved."""
@@ -138,6 +151,19 @@ class Fcl(Peer):
             return Outcome.FAILED, gap
         # -1 is FCL's word for a contact; collide() misses some between flat hulls.
         return (Outcome.APART, gap) if gap > 0.0 else (Outcome.CONTACT, np.nan)
+
+    def follow(self, a: int, b: int, pose: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[int, float]:
+        """Outcome and share of the way at first contact of one pair, b moving by `step` in the frame of a."""
+        fcl = self.module
+        _, (first, _) = self._shape(a)
+        _, (_, second) = self._shape(b)
+        turn = pose[[6, 3, 4, 5]]
+        second.setTransform(fcl.Transform(turn, pose[:3]))
+        result = fcl.ContinuousCollisionResult()
+        fcl.continuousCollide(
+            first, fcl.Transform(), second, fcl.Transform(turn, pose[:3] + step), self._continuous, result
+        )
+        return (Outcome.CONTACT, float(result.time_of_contact)) if result.is_collide else (Outcome.APART, np.nan)
 
 
 class Coal(Peer):
@@ -197,12 +223,14 @@ def read_exactly(source: int, size: int) -> bytes:
 def answer(engine: Peer, rows: NDArray[np.void], timeout_s: float, sink: int) -> None:
     """Write one reply per row, each at once: what was written before a crash tells which pair did it."""
     reply = struct.Struct("<Bd")  # one `REPLY`
-    for a, b, pose in zip(rows["a"].tolist(), rows["b"].tolist(), rows["pose"], strict=True):
+    columns = rows["a"].tolist(), rows["b"].tolist(), rows["pose"], rows["step"]
+    for a, b, pose, step in zip(*columns, strict=True):
         # A hang inside a peer never returns to Python.  The default action of SIGALRM ends it, even if the
         # parent is gone.
         signal.setitimer(signal.ITIMER_REAL, timeout_s)
         try:
-            outcome, gap = engine.measure(a, b, pose)
+            moves = not np.isnan(step[0])
+            outcome, gap = engine.follow(a, b, pose, step) if moves else engine.measure(a, b, pose)
         except Exception as error:
             print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
             outcome, gap = Outcome.FAILED, np.nan
