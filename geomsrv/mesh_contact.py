@@ -17,8 +17,8 @@ from geomsrv.answers import BoolArray, FloatArray, IntArray
 
 __all__ = ["common_plane", "united_in_space"]
 
-# Closing speeds of which neither is greater: a unit normal good to 4 u in each part, three products and two sums.
-SPEED_ROUNDING = 32.0 * 2.0**-53
+# Normals of a triangle, of rounded corners, and of a pair that differ by no more are the same: the latter is taken.
+NORMAL_SLACK = 2.0**-40
 
 # Planes are drawn through a polygon and followed beyond it: what its corners are off counts so many times more.
 PLANE_REACH = 4.0
@@ -33,8 +33,8 @@ def common_plane(
 ) -> FloatArray:
     """Unit normal of planes that have, through each place, one piece of a pair below them and the other above; or NaN.
 
-    Of several it is that along which the bodies approach fastest.  Looked at are the given normals of pairs, and planes
-    of triangles.
+    Planes of triangles go before those of pairs, which may be along the seams between triangles; of several it is that
+    along which the bodies approach fastest.
     """
     triangles = [piece for pair in pairs for piece in pair if len(piece) == 3]
     faces = [np.cross(t[1] - t[0], t[2] - t[0]) for t in triangles]
@@ -42,17 +42,18 @@ def common_plane(
     units = [n / length for n, length in zip(faces, lengths, strict=True) if length > 0.0]
     given = normals[~np.isnan(normals[:, 0])]
     candidates = np.concatenate([given, *(np.stack([n, -n]) for n in units)])
-    candidates = candidates[np.sort(np.unique(candidates, axis=0, return_index=True)[1])]
+    apart = np.ones(len(candidates), np.bool_)
     for (below, above), place in zip(pairs, places, strict=True):
-        highest = ((below - place) @ candidates.T).max(axis=0)
-        lowest = ((above - place) @ candidates.T).min(axis=0)
-        candidates = candidates[(highest <= slack) & (lowest >= -slack)]
-    if not len(candidates):
+        apart &= ((below - place) @ candidates.T).max(axis=0) <= slack
+        apart &= ((above - place) @ candidates.T).min(axis=0) >= -slack
+    exact, rough = candidates[: len(given)][apart[: len(given)]], candidates[len(given) :][apart[len(given) :]]
+    chosen = rough if len(rough) else exact
+    if not len(chosen):
         return np.full(3, np.nan)
-    speed = candidates @ velocity
-    # The first of equals: the normals of pairs are sharper than those of small triangles.
-    best: FloatArray = 0.0 + candidates[int(np.argmax(speed >= speed.max() - SPEED_ROUNDING * np.abs(velocity).sum()))]
-    return best  # without -0.0
+    best: FloatArray = chosen[int(np.argmax(chosen @ velocity))]
+    # That of a pair is correctly rounded, or nearly so.
+    same = exact[(np.abs(exact - best) <= NORMAL_SLACK).all(axis=1)]
+    return 0.0 + (same[0] if len(same) else best)  # without -0.0
 
 
 def united_in_space(sets: Sequence[FloatArray], slack: float, normal: FloatArray) -> list[FloatArray]:

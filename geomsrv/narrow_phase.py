@@ -28,12 +28,14 @@ __all__ = [
     "ContactRows",
     "DistanceRows",
     "distance_rows",
+    "end_to_end",
     "first_contact_rows",
     "followed_solids",
     "placed_boxes",
     "placed_distances",
     "placed_hulls",
     "near_at_rest",
+    "placed",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -149,7 +151,7 @@ class ContactRows(_Rows):
     upper: FloatArray
     last_time: FloatArray
     normal: FloatArray
-    points: NDArray[np.object_]  #: (k,) contact set (m, 3) of every row, or None
+    points: NDArray[np.object_]  #: (k,) contact set (m, 3) of every row, a list of such if it may have parts, or None
 
     @classmethod
     def silent(cls, pairs: IntArray) -> ContactRows:
@@ -405,6 +407,14 @@ def _sets(points: FloatArray, offsets: IntArray) -> NDArray[np.object_]:
     return sets
 
 
+def end_to_end(sets: Iterable[Any]) -> tuple[FloatArray, IntArray, IntArray]:
+    """Contact sets as those of `ContactRows`: all points, where those of each row begin, and where its parts do."""
+    listed = [[] if parts is None else parts if isinstance(parts, list) else [parts] for parts in sets]
+    flat = [part for parts in listed for part in parts]
+    ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
+    return np.concatenate([np.zeros((0, 3)), *flat]), ends[np.cumsum([0, *map(len, listed)])], ends
+
+
 _Side = tuple[Any, ...]
 
 
@@ -440,11 +450,15 @@ def placed_hulls(world: World, rows: IntArray) -> tuple[FloatArray, IntArray]:
     """Vertices (k, 3) and offsets of hulls in the fixed frame: these numbers, rounded, are taken literally."""
     packed = world.table.packed
     vertices, offsets = gather(packed.vertices, packed.offsets, world.shape[rows])
-    owner = np.repeat(rows, np.diff(offsets))
-    turn, (x, y, z) = world.rotations[owner], vertices.T
+    return placed(world, np.repeat(rows, np.diff(offsets)), vertices), offsets
+
+
+def placed(world: World, rows: IntArray, points: FloatArray) -> FloatArray:
+    """Points (k, 3) of the listed objects in the fixed frame, rounded."""
+    turn, (x, y, z) = world.rotations[rows], points.T
     # Not a matrix product: that may add up in another order for another number of vertices.
     turned = [turn[:, k, 0] * x + turn[:, k, 1] * y + turn[:, k, 2] * z for k in range(3)]
-    return np.column_stack(turned) + world.poses[owner, :3], offsets
+    return np.column_stack(turned) + world.poses[rows, :3]
 
 
 def _relative_velocity(world: World, pairs: IntArray, dimension: int) -> FloatArray:

@@ -23,6 +23,7 @@ from geomsrv.narrow_phase import (
     DistanceRows,
     Unsupported,
     count_kinds,
+    end_to_end,
     placed_distances,
     polygon_contacts,
     polygon_distances,
@@ -93,6 +94,8 @@ class ListedContacts:
         As in `PairContacts`.
     points : (k, 3) float64, point_offsets : (n + 1,) int64
         Contact set of pair i: ``points[point_offsets[i]:point_offsets[i + 1]]``, fixed frame.
+    part_offsets : (m + 1,) int64
+        Its parts, as in `PairContacts`.
     message : str
         Names what is unsupported; empty otherwise.
     cost : Cost
@@ -107,6 +110,7 @@ class ListedContacts:
     closing_speed: FloatArray
     points: FloatArray
     point_offsets: IntArray
+    part_offsets: IntArray
     message: str
     cost: Cost
 
@@ -321,9 +325,8 @@ def listed_first_contacts(
     status[listed.incomparable | (listed.rows_among(unsupported.pairs) < len(unsupported.pairs))] = (
         ContactStatus.UNSUPPORTED
     )
-    none = np.zeros((0, 3))
-    sets = [none if points is None else points for points in [*rows.points, none]]
-    chosen = [sets[k] for k in at.tolist()]
+    sets = [*rows.points, None]
+    points, point_offsets, part_offsets = end_to_end(sets[k] for k in at.tolist())
     normal = _take(rows.normal, at, np.nan)
     return ListedContacts(
         status=status,
@@ -333,8 +336,9 @@ def listed_first_contacts(
         last_time=_take(rows.last_time, at, np.nan),
         normal=np.where(listed.swapped[:, None], 0.0 - normal, normal),
         closing_speed=_take(closing_speeds(world, rows), at, np.nan),
-        points=np.concatenate([none, *chosen]),
-        point_offsets=np.cumsum([0, *map(len, chosen)], dtype=np.int64),
+        points=points,
+        point_offsets=point_offsets,
+        part_offsets=part_offsets,
         message=listed.message(unsupported),
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
     )
@@ -356,8 +360,7 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
     counts = Counter[str]()
     _count(world, pairs, counts)
     rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon, tier, counts)
-    none = np.zeros((0, 3))
-    sets = [none if points is None else points for points in rows.points]
+    points, point_offsets, part_offsets = end_to_end(rows.points)
     return ListedContacts(
         status=rows.status,
         time=rows.time,
@@ -366,8 +369,9 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
         last_time=rows.last_time,
         normal=rows.normal,
         closing_speed=closing_speeds(world, rows),
-        points=np.concatenate([none, *sets]),
-        point_offsets=np.cumsum([0, *map(len, sets)], dtype=np.int64),
+        points=points,
+        point_offsets=point_offsets,
+        part_offsets=part_offsets,
         message="",
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
     )

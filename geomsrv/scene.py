@@ -24,7 +24,7 @@ from geomsrv import _validate
 from geomsrv.answers import BoolArray, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
 from geomsrv.errors import GeometryError, SceneError
-from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows
+from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, end_to_end
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
 from geomsrv.queries import TIERS
@@ -200,6 +200,9 @@ class PairContacts(_PairRows):
         contact point where it is fastest.  NaN without a normal.
     points : (k, 3) float64, point_offsets : (n + 1,) int64
         Contact set of row i: ``points[point_offsets[i]:point_offsets[i + 1]]``, at ``time``, fixed frame.
+    part_offsets : (m + 1,) int64
+        Parts of contact sets, of which meshes have several: ``points[part_offsets[k]:part_offsets[k + 1]]``, as in
+        `FirstContacts`.
     unsupported : list of (str, str, str)
         Id, id and reason of each UNSUPPORTED row.
     cost : Cost
@@ -217,6 +220,7 @@ class PairContacts(_PairRows):
     closing_speed: FloatArray
     points: FloatArray
     point_offsets: IntArray
+    part_offsets: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -578,8 +582,6 @@ class Scene:
         find = first_contact_row if earliest else contact_rows
         rows, unsupported = find(world, pairs, limit, tier, counts, near)
         counts["unsupported"] += len(unsupported.pairs)
-        sets = [points for points in rows.points if points is not None]
-        sizes = [0 if points is None else len(points) for points in rows.points]
         return PairContacts(
             Cost(time.perf_counter_ns() - start, tier, dict(counts)),
             world.version,
@@ -595,8 +597,7 @@ class Scene:
             rows.last_time,
             rows.normal,
             closing_speeds(world, rows),
-            np.concatenate([np.zeros((0, 3)), *sets]),
-            np.cumsum([0, *sizes], dtype=np.int64),
+            *end_to_end(rows.points),
         )
 
     def cull(self, frustum: Frustum, *, ids: Iterable[str] | None = None, accuracy: str = "float64") -> SceneCull:

@@ -645,6 +645,12 @@ class Mesh(Shape):
     triangles: NDArray[np.int64]
     kind: ClassVar[str] = "mesh"
 
+    def with_vertices(self, vertices: ArrayLike) -> Mesh:
+        """The same triangles between other vertices (m, 3), as of the mesh after a motion."""
+        moved = Mesh(vertices, self.triangles)
+        moved.__dict__["order"] = self.order
+        return moved
+
     @cached_property
     def order(self) -> NDArray[np.int64]:
         """Triangles in the order of `ordered`; found on first use."""

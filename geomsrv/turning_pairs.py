@@ -18,6 +18,7 @@ from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
 from geomsrv.broad_phase import entry_times
 from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.mesh_pairs import mesh_contacts, sliding_meshes
 from geomsrv.narrow_phase import (
     ContactRows,
     Unsupported,
@@ -52,6 +53,9 @@ def contact_rows(
     """
     if margin > 0.0:
         return _approaches(world, pairs, horizon, counts, margin)
+    if (meshes := sliding_meshes(world, pairs, horizon)).any():
+        rows, unsupported = contact_rows(world, pairs[~meshes], horizon, tier, counts)
+        return ContactRows.joined([mesh_contacts(world, pairs[meshes], horizon, tier, counts), rows]), unsupported
     straight = not world.turns.any() and bool((world.planar | followed_solids(world)).all())
     if tier != "float64" or horizon == 0.0 or straight:
         return first_contact_rows(world, pairs, horizon, tier, counts)

@@ -264,6 +264,47 @@ def test_first_contact_of_all_pairs(desk) -> None:
     assert ("box", "deep") == (now.ids_a[0], now.ids_b[0]) and now.item_status[0] == 3 and now.time[0] == 0.0
 
 
+def test_first_contact_of_meshes(desk) -> None:
+    """Two sills on a table: two parts, of two triangles each; sorted by time among others."""
+    sills = gs.Mesh(
+        [(x, y, 0) for x0 in (0, 2) for x, y in ((x0, 0), (x0 + 1, 0), (x0 + 1, 1), (x0, 1))],
+        [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)],
+    )
+    table = gs.Box([5, 5, 1])
+    fields = {"select": INLINE, "shapes_a": shapes(sills), "shapes_b": shapes(table), "horizon": 9.0}
+    fields |= {"poses_a": at((0, 0, 2)), "poses_b": at((0, 0, -1)), "twists_a": D([[0, 0, -1, 0, 0, 0]])}
+    got = desk.ask("FirstContact", **fields, want=["contact_set"])
+    assert got.status == OK and got.time.tolist() == [2.0] and got.normal.tolist() == [0, 0, -1]
+    assert got.point_offsets.tolist() == [0, 8] and got.part_offsets.tolist() == [0, 4, 8]
+    proof = desk.ask("FirstContact", **fields, certificates=True)
+    assert proof.status == OK and '"claim": {}' in proof.certificates[0]
+    desk.engine.apply(
+        gs.SceneUpdate(
+            clear=True,
+            add=[
+                obj("left", SQUARE, (0, 0, 0), (1, 0, 0)),
+                obj("right", SQUARE, (3, 0.5, 0)),
+                obj("sills", sills, (50, 0, 1.5), (0, 0, -1)),
+                obj("table", table, (50, 0, -1)),
+                obj("block", gs.Box([1, 1, 1]), (53, 0, 1)),
+            ],
+        )
+    )
+    got = desk.ask("FirstContact", select=ALL, horizon=9.0, want=["contact_set"])
+    sets = [got.point_offsets[k + 1] - got.point_offsets[k] for k in range(len(got.ids_a))]
+    assert sum(sets) == got.part_offsets[-1] == len(got.points) // 3
+    assert set(got.point_offsets) <= set(got.part_offsets)
+    k = list(zip(got.ids_a, got.ids_b, strict=True)).index(("sills", "table"))
+    parts = [end for end in got.part_offsets if got.point_offsets[k] <= end <= got.point_offsets[k + 1]]
+    assert got.time[k] == 1.5 and np.diff(parts).tolist() == [4, 4]
+    ((_, answer),) = desk.engine.steps({"contacts"})
+    sent = message("geomsrv/ContactArray")()
+    convert.set_contacts(sent, answer, message("geomsrv/Contact"), message("geometry_msgs/Point"))
+    listed = {(contact.id_a, contact.id_b): contact for contact in sent.contacts}
+    contact = listed["sills", "table"]
+    assert len(contact.points) == 8 and contact.part_offsets.tolist() == [0, 4, 8]
+
+
 def test_uncertain_polygons_answer_wider_intervals(desk) -> None:
     desk.engine.apply(gs.SceneUpdate(add=[obj("left", SQUARE, (0, 0, 0), (1, 0, 0), uncertainty=1e-3)]))
     got = desk.ask("FirstContact", select=BY_IDS, ids_a=["right"], ids_b=["left"], horizon=5.0, want=["contact_set"])

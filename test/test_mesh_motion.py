@@ -18,6 +18,7 @@ from oracle.vectors import nearest_double
 from polytope_scenes import Turn, random_body
 
 import geomsrv as gs
+from geomsrv.answers import ContactStatus
 from geomsrv.robot import Robot, example_robot_directory
 
 QUADS = [
@@ -262,6 +263,11 @@ def test_soles(scale: float, accuracy: str) -> None:
     eaves = [(0, 0, 0), (2, 0, 0), (0, 1, 1), (2, 1, 1), (0, -1, 1), (2, -1, 1)]
     ridge = ask(gs.Mesh(eaves, [(0, 1, 2), (1, 3, 2), (1, 0, 4), (5, 1, 4)]), same)
     assert sets(ridge, scale) == [[(0, 0, -2), (2, 0, -2)]] and ridge.normal.tolist() == [[0, 0, -1]]
+    # Corner on corner: of the faces' normals that along which they approach fastest.
+    for way in ((3, 2, 1), (2, 1, 3), (1, 3, 2)):
+        corner = ask(box_mesh((-1, -1, -1), (0, 0, 0)), box_mesh(np.array(way) * scale, np.add(way, 1) * scale), way)
+        assert corner.time[0] == 1 and sets(corner, scale) == [[way]]
+        assert corner.normal[0].tolist() == [float(x == 3) for x in way] and corner.closing_speed[0] == 3 * scale
     # A corner, obliquely, right onto the diagonal of a face: the face has the only normal.
     spike = gs.Mesh([(0, 0, 0), (1, 0, 2), (0, 1, 2), (-1, -1, 2)], [(0, 1, 2), (0, 2, 3), (0, 3, 1)])
     tip = ask(spike, same, (1, 1, -1))
@@ -415,3 +421,68 @@ def test_a_gripper_closes_on_a_box() -> None:
         later += answer.status[0] == gs.NEVER or bool(early.time[0] < answer.time[0] - 1e-3)
         assert early.status[0] == gs.WILL_TOUCH and not answer.time[0] < early.time[0] - 1e-15
     assert later > 0
+
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def cell(*items: Any) -> gs.Scene:
+    scene = gs.Scene()
+    scene.apply(gs.SceneUpdate(add=[gs.SceneObject(*item[:2], pose=item[2], twist=item[3]) for item in items]))
+    return scene
+
+
+@pytest.mark.parametrize("accuracy", ["bound", "float32", "float64", "exact"])
+def test_scenes(rng: np.random.Generator, accuracy: str) -> None:
+    """A mesh is placed once; from then on its answer is that of `first_contact` for those numbers."""
+    turn = (0.0, 0.0, *(np.array([1.0, 1.0]) / math.sqrt(2)))
+    frame = joined(*(box_mesh((*low, 0), (*high, 1)) for low, high in [((0, 0), (4, 1)), ((0, 3), (4, 4))]))
+    down = (0, 0, -0.5, 0, 0, 0)
+    scene = cell(
+        ("frame", frame, (0, 0, 2, *turn), down),
+        ("table", gs.Box([9, 9, 1]), (0, 0, -1, *UPRIGHT), (0,) * 6),
+        ("wedge", gs.Convex([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]), (-3.5, 0, 6, *UPRIGHT), (0, 0, -1, 0, 0, 0)),
+        ("other", frame, (0, 0, 9, *UPRIGHT), (0, 0, -1.5, 0, 0, 0)),
+        ("spinning", frame, (30, 0, 2, *UPRIGHT), (-3, 0, 0, 0, 0, 1)),
+        ("ball", gs.Sphere(0.1), (-2, 2, -3, *UPRIGHT), (0, 0, 1, 0, 0, 0)),
+    )
+    answer = scene.first_contacts(horizon=20.0, accuracy=accuracy)
+    rows = {frozenset(pair): k for k, pair in enumerate(zip(answer.ids_a, answer.ids_b, strict=True))}
+    k = rows[frozenset(("frame", "table"))]
+    assert answer.status[k] == gs.WILL_TOUCH and answer.cost.counts["narrow box-mesh"] == 2
+    assert answer.time_lower[k] <= 4.0 <= answer.time_upper[k] + 1e-12
+    ends = answer.part_offsets
+    parts = [
+        answer.points[i:j]
+        for i, j in zip(ends[:-1], ends[1:], strict=True)
+        if answer.point_offsets[k] <= i < answer.point_offsets[k + 1]
+    ]
+    if accuracy == "bound":
+        assert parts == []
+    else:
+        sign = 1 if answer.ids_a[k] == "frame" else -1
+        assert answer.time[k] == 4 and answer.normal[k].tolist() == [0, 0, -sign] and answer.closing_speed[k] == 0.5
+        assert sorted(len(part) for part in parts) == [4, 4] and answer.last_time[k] == 10
+        both = rows[frozenset(("frame", "other"))]
+        assert answer.time[both] == pytest.approx(6.0, abs=1e-12) and answer.status[both] == gs.WILL_TOUCH
+        assert frozenset(("frame", "wedge")) in rows
+    reasons = {frozenset((a, b)): reason for a, b, reason in answer.unsupported}
+    assert frozenset(("spinning", "table")) in reasons and frozenset(("ball", "frame")) in reasons
+    # Together or apart, in whatever order.
+    once = scene.first_contacts(horizon=20.0, accuracy=accuracy, earliest=True)
+    assert len(once.status) - (once.status == ContactStatus.UNSUPPORTED).sum() == 1
+
+
+def test_meshes_that_start_in_contact_or_never_meet() -> None:
+    cube = box_mesh((0, 0, 0), (1, 1, 1))
+    scene = cell(
+        ("a", cube, (0, 0, 0, *UPRIGHT), (0,) * 6),
+        ("b", cube, (1, 0, 0, *UPRIGHT), (0,) * 6),
+        ("c", cube, (0.5, 0.5, 0.5, *UPRIGHT), (0,) * 6),
+        ("d", cube, (5, 0, 0, *UPRIGHT), (1, 0, 0, 0, 0, 0)),
+    )
+    answer = scene.first_contacts(horizon=3.0)
+    status = dict(zip(zip(answer.ids_a, answer.ids_b, strict=True), answer.status.tolist(), strict=True))
+    assert status == {("a", "b"): gs.TOUCHING, ("a", "c"): gs.OVERLAPPING, ("b", "c"): gs.OVERLAPPING}
+    now = scene.first_contacts(horizon=0.0)
+    assert now.status.tolist() == answer.status.tolist()

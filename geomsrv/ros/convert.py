@@ -452,6 +452,8 @@ def set_contacts(
     )
     status, time, lower, upper, last, depth, speed, normal = (column.tolist() for column in columns)
     points, offsets = pairs.points.tolist(), pairs.point_offsets.tolist()
+    ends = pairs.part_offsets
+    parts = np.searchsorted(ends, offsets).tolist()
     contacts = []
     for i in np.argsort(pairs.time, kind="stable").tolist():
         contact = contact_type()
@@ -463,6 +465,8 @@ def set_contacts(
             point = point_type()
             set_vector(point, row)
             contact.points.append(point)
+        if offsets[i] < offsets[i + 1]:
+            contact.part_offsets = uint32s(ends[parts[i] : parts[i + 1] + 1] - offsets[i])
         contact.note = notes.get((contact.id_a, contact.id_b), "")
         contacts.append(contact)
     message.contacts = contacts

@@ -319,6 +319,12 @@ class Handlers:
             if request.select == BY_IDS:
                 _set_ids(response, world, pairs)
         _set_first_contacts(response, answer, order, want)
+        if "contact_set" in want:
+            ends = answer.part_offsets
+            if order is not None:
+                sizes, _ = gather(np.diff(ends), np.searchsorted(ends, answer.point_offsets), order)
+                ends = np.cumsum([0, *sizes.tolist()])
+            response.part_offsets = convert.uint32s(ends)
         _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, note=answer.message)
 
     @_answered()
