@@ -20,7 +20,7 @@ from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.mesh_contact import common_plane, united_in_space
 from geomsrv.mesh_tree import Sweep, Tree, in_order
 from geomsrv.shapes import Boxes, Convex, Mesh, Polytopes
-from geomsrv.turning import turns
+from geomsrv.turning import middles, turns
 from geomsrv.verify import Pair, clip_of, relative_velocity, way_of
 
 __all__ = ["first_contact_meshes"]
@@ -28,6 +28,12 @@ __all__ = ["first_contact_meshes"]
 # A contact point found for several pairs of pieces: a vertex moved by a product and a sum, or a point of an edge, up
 # to the slack within which bodies of such coordinates touch; some 60 roundings of their size, rounded up.
 PLACE_ROUNDING = 256.0 * 2.0**-53
+
+# A box from its ends: a sum, differences and halves take 3 u; and what vanishes.
+NODE_ROUNDING = 8.0 * 2.0**-53
+SMALLEST = 2.0**-1070
+
+TURNING_BATCH = 32  # pairs of boxes that turn are dear: the earliest alone are looked into
 
 Ask = Callable[..., FirstContacts]
 
@@ -37,9 +43,7 @@ def first_contact_meshes(
 ) -> FirstContacts:
     """The answer of `first_contact`, which is passed in, where a or b is a mesh."""
     start = time.perf_counter_ns()
-    if turns(options.pop("angular_velocity_a"), options.pop("angular_velocity_b")):
-        raise NotAvailableError("meshes that turn are not available yet")
-    del options["center_a"], options["center_b"], options["tolerance"]
+    turning = turns(options["angular_velocity_a"], options["angular_velocity_b"])
     if options["certificates"]:
         raise NotAvailableError("certificates of a Mesh are not available yet")
     bodies = [_Pieces(body, name) for body, name in ((a, "a"), (b, "b"))]
@@ -48,10 +52,24 @@ def first_contact_meshes(
     end = _validate.limit(options["t_max"], "t_max")
     # What is refused is refused even where no boxes meet.
     none = Polytopes(np.zeros((0, 3)), [0])
-    tier = ask(none, none, (0, 0, 0), (0, 0, 0), **options).cost.accuracy
+    options = dict(options)
+    about: dict[str, Any] = {}
+    for body, name in zip(bodies, "ab", strict=True):
+        angular, center = (options.pop(f"{what}_{name}") for what in ("angular_velocity", "center"))
+        about[f"angular_velocity_{name}"] = _rows(
+            (0, 0, 0) if angular is None else angular, f"angular_velocity_{name}", count
+        )
+        about[f"center_{name}"] = body.middles(count) if center is None else _rows(center, f"center_{name}", count)
+    at_once = {name: rows[:1] for name, rows in about.items()} if turning and count else {}
+    tier = ask(none, none, (0, 0, 0), (0, 0, 0), **options, **at_once).cost.accuracy
     wanted, options = bool(options["contact_set"]), {**options, "contact_set": True}
     counts: Counter[str] = Counter()
-    rows = [_first(ask, bodies, i, (moving[0][i], moving[1][i]), end, options, counts) for i in range(count)]
+    rows = []
+    for i in range(count):
+        ways = moving[0][i], moving[1][i]
+        if turning:
+            options |= {name: values[i] for name, values in about.items()}
+        rows.append((_first_turning if turning else _first)(ask, bodies, i, ways, end, options, counts))
     sets = [row.parts if wanted else [] for row in rows]
     points = [part for parts in sets for part in parts]
     ends = np.cumsum([0, *map(len, points)], dtype=np.int64)
@@ -75,7 +93,7 @@ def first_contact_meshes(
         points=np.concatenate([np.zeros((0, 3)), *points]),
         point_offsets=ends[np.cumsum([0, *map(len, sets)])],
         certain=np.array([row.certain for row in rows], np.bool_),
-        _closing_speed=speed,
+        _closing_speed=np.array([row.closing_speed for row in rows]) if turning else speed,
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
         _part_offsets=ends,
     )
@@ -111,6 +129,21 @@ class _Pieces:
             return Boxes(body.center[i : i + 1], body.axes[i : i + 1], body.half_extents[i : i + 1])
         return Polytopes(body[i], [0, len(body[i])])
 
+    def middles(self, count: int) -> FloatArray:
+        """(n, 3) what an item turns about by default."""
+        body = self._body
+        if isinstance(body, Mesh):
+            return np.broadcast_to(0.5 * body.vertices.min(axis=0) + 0.5 * body.vertices.max(axis=0), (count, 3))
+        return np.broadcast_to(middles(body), (count, 3))
+
+    def nodes(self, i: int, tree: Tree, rows: IntArray) -> Boxes | Polytopes:
+        """Boxes that hold what is in nodes of the tree of item i."""
+        if not isinstance(self._body, Mesh):
+            return self.batch(i, rows)
+        center = 0.5 * tree.low[rows] + 0.5 * tree.high[rows]
+        half = np.maximum(tree.high[rows] - center, center - tree.low[rows]) * (1.0 + NODE_ROUNDING) + SMALLEST
+        return Boxes(center, np.broadcast_to(np.eye(3), (len(rows), 3, 3)), half)
+
     def corners(self, i: int, piece: int) -> FloatArray:
         """Vertices of one piece, relative to nothing."""
         batch = self.batch(i, np.array([piece]))
@@ -123,6 +156,7 @@ class _Row:
     status: int = ContactStatus.NEVER
     numbers = (np.nan, np.nan, np.nan, np.nan)  #: time, lower, upper, last
     certain: bool = True
+    closing_speed: float = np.nan
 
     def __init__(self) -> None:
         self.normal = np.full(3, np.nan)
@@ -177,16 +211,8 @@ def _first(
         bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
         last = float(np.fmax.reduce(answer.last_time, initial=last))
 
-    def earliest(pieces_a: IntArray, pieces_b: IntArray) -> float:
-        look(pieces_a, pieces_b)
-        return bound
-
-    def latest(pieces_a: IntArray, pieces_b: IntArray) -> float:
-        look(pieces_a, pieces_b)
-        return last
-
     sweep = Sweep.of(bodies[0].tree(i), bodies[1].tree(i), *ways)
-    in_order(sweep, bound, False, earliest)
+    in_order(sweep.a, sweep.b, sweep.first, lambda: sweep.not_after(bound), look)
     if not found.answers:
         return row
     status = found.column("status")
@@ -199,7 +225,7 @@ def _first(
     tied = np.flatnonzero(lower <= high)
     answers = len(found.answers)
     if last < end:
-        in_order(sweep, last, True, latest)
+        in_order(sweep.a, sweep.b, sweep.last, lambda: sweep.after(last) if last < end else -np.inf, look)
     del found.answers[answers:]  # none of them is earlier
     deep = status == ContactStatus.OVERLAPPING
     row.status = int(status[tied].max())
@@ -231,6 +257,65 @@ def _first(
     if not overlapping:
         if row.status == ContactStatus.TOUCHING and len(tied) > 1 and np.isnan(row.normal[0]):
             row.certain = False  # none may pass through the other, and both together do
+    return row
+
+
+def _first_turning(
+    ask: Ask,
+    bodies: list[_Pieces],
+    i: int,
+    ways: tuple[FloatArray, FloatArray],
+    end: float,
+    options: dict[str, Any],
+    counts: Counter[str],
+) -> _Row:
+    """The same for bodies that turn: boxes around pieces turn with them."""
+    found, row = _Found(), _Row()
+    bound = end
+    trees = [body.tree(i) for body in bodies]
+
+    def followed(sides: tuple[Boxes | Polytopes, Boxes | Polytopes], contact_set: bool) -> FirstContacts:
+        # What meets later than a proven contact need not be followed.
+        answer = ask(*sides, *ways, **{**options, "t_max": bound, "contact_set": contact_set})
+        counts.update(answer.cost.counts)
+        return answer
+
+    def begin(nodes_a: IntArray, nodes_b: IntArray) -> FloatArray:
+        if not len(nodes_a):
+            return np.zeros(0)
+        one, two = (
+            body.nodes(i, tree, rows) for body, tree, rows in zip(bodies, trees, (nodes_a, nodes_b), strict=True)
+        )
+        answer = followed((one, two), False)
+        return np.where(answer.status == ContactStatus.NEVER, np.inf, answer.time_lower)
+
+    def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
+        nonlocal bound
+        answer = followed((bodies[0].batch(i, pieces_a), bodies[1].batch(i, pieces_b)), True)
+        counts["pairs of pieces"] += len(pieces_a)
+        found.answers.append(answer)
+        bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
+
+    in_order(trees[0], trees[1], begin, lambda: bound, look, TURNING_BATCH)
+    if not found.answers:
+        return row
+    status, lower = found.column("status"), found.column("time_lower")
+    met = status != ContactStatus.NEVER
+    if not met.any():
+        return row
+    first = int(np.where(met, lower, np.inf).argmin())
+    low, high = float(lower[first]), float(np.fmin.reduce(found.column("time_upper")))
+    row.numbers = (low, low, high, np.nan)
+    row.status = int(status[first])
+    if row.status == ContactStatus.GRAZING and high - low <= options["tolerance"]:
+        row.status = ContactStatus.WILL_TOUCH
+    for at_once in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING):
+        row.status = at_once if (status == at_once).any() else row.status
+    row.certain = row.status not in (ContactStatus.TOUCHING, ContactStatus.GRAZING, ContactStatus.NOT_CONVERGED)
+    if row.status != ContactStatus.OVERLAPPING:
+        row.normal = found.column("normal")[first]
+        row.closing_speed = float(found.column("closing_speed")[first])
+    row.parts = [part for part in [found.set_of(first)] if len(part)]
     return row
 
 

@@ -93,12 +93,27 @@ class Sweep:
         a, b = (tree._replace(low=np.ldexp(tree.low, -scale), high=np.ldexp(tree.high, -scale)) for tree in (a, b))
         return cls(a, b, np.ldexp(half, -speed), scale - speed - 1)
 
-    def seconds_up(self, time: FloatArray | float) -> float:
-        """A time in its own unit, not rounded down."""
+    def first(self, i: IntArray, k: IntArray) -> FloatArray:
+        """When boxes may meet first, in its own unit; inf if they never do."""
+        enter, _, meet = self._spans(i, k)
+        return np.where(meet, enter, np.inf)
+
+    def last(self, i: IntArray, k: IntArray) -> FloatArray:
+        """When boxes may meet last, in its own unit and backwards; inf if they never do."""
+        _, leave, meet = self._spans(i, k)
+        return np.where(meet, -leave, np.inf)
+
+    def not_after(self, time: float) -> float:
+        """Limit of `first`, for a time in seconds."""
         with np.errstate(over="ignore"):
             return float(np.nextafter(np.ldexp(time, -self.exponent), np.inf))
 
-    def spans(self, i: IntArray, k: IntArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    def after(self, time: float) -> float:
+        """Limit of `last`, for a time in seconds."""
+        with np.errstate(over="ignore"):
+            return float(np.nextafter(-np.ldexp(time, -self.exponent), -np.inf))
+
+    def _spans(self, i: IntArray, k: IntArray) -> tuple[FloatArray, FloatArray, BoolArray]:
         """From when to when boxes may meet, from 0 on; and whether they may at all."""
         near = self.b.low[k] - self.a.high[i] - BOX_SLACK
         far = self.b.high[k] - self.a.low[i] + BOX_SLACK
@@ -115,8 +130,6 @@ class Sweep:
             & ~((near > 0.0) & at_rest).any(axis=1)
             & ~((far < 0.0) & at_rest).any(axis=1)
         )
-        # An empty box is as far away as can be.
-        meet &= np.isfinite(near).all(axis=1)
         return enter, leave, meet
 
 
@@ -125,34 +138,42 @@ def _exponent(values: FloatArray) -> int:
     return math.frexp(float(finite.max(initial=0.0)))[1]
 
 
-def in_order(sweep: Sweep, bound: float, latest_first: bool, ask: Callable[[IntArray, IntArray], float]) -> None:
-    """Ask for pairs of pieces in the order in which they may meet, or from the last one backwards.
+def in_order(
+    a: Tree,
+    b: Tree,
+    keys: Callable[[IntArray, IntArray], FloatArray],
+    limit: Callable[[], float],
+    look: Callable[[IntArray, IntArray], None],
+    batch: int = BATCH,
+) -> None:
+    """Look at pairs of pieces in the order of their keys, as long as these are not above the limit, which may fall.
 
-    `ask` is told pieces of a and of b, and returns a new bound [s]: those that meet later are left out; of those that
-    are looked at from the last one on, all that part no later.
+    `keys` tells a number for nodes of both trees that is not above those of what is in them; `look` is told pieces.
     """
-    leaves_a, leaves_b = len(sweep.a.piece), len(sweep.b.piece)
+    leaves_a, leaves_b = len(a.piece), len(b.piece)
     i, k = np.ones(1, np.int64), np.ones(1, np.int64)
     key = np.full(1, -np.inf)
     while True:
-        limit = sweep.seconds_up(bound) if not latest_first else -float(np.ldexp(bound, -sweep.exponent))
-        alive = key <= limit if not latest_first else key < limit
+        alive = key <= limit()
         i, k, key = i[alive], k[alive], key[alive]
         if not len(i):
             return
         chosen = np.zeros(len(i), np.bool_)
-        chosen[np.argpartition(key, BATCH)[:BATCH] if len(i) > BATCH else slice(None)] = True
+        chosen[np.argpartition(key, batch)[:batch] if len(i) > batch else slice(None)] = True
         here, there = i[chosen], k[chosen]
         i, k, key = i[~chosen], k[~chosen], key[~chosen]
         end_a, end_b = here >= leaves_a, there >= leaves_b
         pieces = end_a & end_b
         if pieces.any():
-            bound = ask(sweep.a.piece[here[pieces] - leaves_a], sweep.b.piece[there[pieces] - leaves_b])
-        extent = [(tree.high[n] - tree.low[n]).max(axis=1) for tree, n in ((sweep.a, here), (sweep.b, there))]
+            look(a.piece[here[pieces] - leaves_a], b.piece[there[pieces] - leaves_b])
+        extent = [(tree.high[n] - tree.low[n]).max(axis=1) for tree, n in ((a, here), (b, there))]
         halve_a = ~end_a & (end_b | (extent[0] >= extent[1]))
         halve_b = ~end_b & ~halve_a
         new_i = np.concatenate([2 * here[halve_a], 2 * here[halve_a] + 1, here[halve_b], here[halve_b]])
         new_k = np.concatenate([there[halve_a], there[halve_a], 2 * there[halve_b], 2 * there[halve_b] + 1])
-        enter, leave, meet = sweep.spans(new_i, new_k)
-        i, k = np.concatenate([i, new_i[meet]]), np.concatenate([k, new_k[meet]])
-        key = np.concatenate([key, (-leave if latest_first else enter)[meet]])
+        filled = (a.low[new_i, 0] < np.inf) & (b.low[new_k, 0] < np.inf)
+        new_i, new_k = new_i[filled], new_k[filled]
+        new_key = keys(new_i, new_k)
+        there_is = new_key < np.inf
+        i, k = np.concatenate([i, new_i[there_is]]), np.concatenate([k, new_k[there_is]])
+        key = np.concatenate([key, new_key[there_is]])

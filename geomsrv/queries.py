@@ -225,7 +225,7 @@ def first_contact(
     a, b : Polygons (2D), Polytopes or Boxes (3D)
         n against n, or one against n.  A Region is one body, in world coordinates here, against Polygons or another,
         at the cost of all pairs of pieces.  A Mesh, which is a surface, and a Convex are one body each, in world
-        coordinates here, against each other, Boxes or Polytopes; a Mesh cannot turn yet.
+        coordinates here, against each other, Boxes or Polytopes.
     velocity_a, velocity_b : (n, d) or (d,) float
         Constant linear velocities [m/s], world frame; of bodies that turn those of their centres.
     t_max : float

@@ -15,7 +15,7 @@ from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import Boxes, Polygons, Polytopes
 
-__all__ = ["first_contact_turning", "turns"]
+__all__ = ["first_contact_turning", "middles", "turns"]
 
 Bodies = Boxes | Polygons | Polytopes
 
@@ -65,7 +65,7 @@ def first_contact_turning(
         parts = (
             _rows(velocity, f"velocity_{name}", count, d),
             _angular(angular, f"angular_velocity_{name}", count, flat),
-            _middles(body) if center is None else _rows(center, f"center_{name}", count, d),
+            middles(body) if center is None else _rows(center, f"center_{name}", count, d),
         )
         motion = np.zeros((max(len(part) for part in parts), 9))
         for k, part in enumerate(parts):
@@ -117,7 +117,7 @@ def _packed(body: Bodies) -> tuple[Any, ...]:
     return (body.center, body.axes, body.half_extents) if isinstance(body, Boxes) else (body.vertices, body.offsets)
 
 
-def _middles(body: Bodies) -> FloatArray:
+def middles(body: Bodies) -> FloatArray:
     """(n, d) centres of boxes, or the middles of the bounding boxes, rounded: what a body turns about by default."""
     if isinstance(body, Boxes):
         return body.center

@@ -423,6 +423,51 @@ def test_a_gripper_closes_on_a_box() -> None:
     assert later > 0
 
 
+def test_turning_meshes_meet_as_their_triangles_do(rng: np.random.Generator) -> None:
+    """What is left out comes later; and a box's surface meets first what the box does."""
+    seen = Counter[int]()
+    looked = pairs = 0
+    for k in range(14):
+        a, b = terrain(rng, 3, Turn(rng, 2.0)), terrain(rng, 3, Turn(rng, 2.0))
+        b = at(b, a.vertices.mean(axis=0) - b.vertices.mean(axis=0) + rng.normal(size=3) * (1 if k == 0 else 6))
+        v = (b.vertices.mean(axis=0) - a.vertices.mean(axis=0)) * 0.5 + rng.normal(size=3)
+        centers = {"center_a": rng.normal(size=3), "center_b": b.vertices[0]}
+        motion: dict[str, Any] = {"t_max": 4.0, "angular_velocity_a": rng.normal(size=3), "tolerance": 1e-9, **centers}
+        if k % 2:
+            motion["angular_velocity_b"] = rng.normal(size=3) * 2
+        whole = gs.first_contact(a, b, v, (0, 0, 0), **motion)
+        one, two = (m.vertices[m.triangles] for m in (a, b))
+        i, j = np.indices((len(one), len(two))).reshape(2, -1)
+        ends = np.arange(0, 3 * len(i) + 1, 3)
+        sides = [gs.Polytopes(side.reshape(-1, 3), ends) for side in (one[i], two[j])]
+        every = gs.first_contact(*sides, v, (0, 0, 0), **motion)
+        seen[int(whole.status[0])] += 1
+        looked, pairs = looked + whole.cost.counts.get("pairs of pieces", 0), pairs + len(i)
+        assert (whole.status[0] == gs.NEVER) == (every.status == gs.NEVER).all()
+        if whole.status[0] != gs.NEVER:
+            low, high = np.fmin.reduce(every.time_lower), np.fmin.reduce(every.time_upper)
+            assert whole.time_lower[0] <= high and low <= whole.time_upper[0] and np.isnan(whole.last_time[0])
+            assert whole.time_upper[0] - whole.time_lower[0] <= 1e-9
+            near = np.flatnonzero(every.time_lower <= high)
+            assert any(np.allclose(whole.normal[0], every.normal[n], atol=1e-6, equal_nan=True) for n in near)
+    assert seen[gs.NEVER] > 0 and seen[gs.WILL_TOUCH] > 4 and looked < 0.5 * pairs
+    bar, post = (
+        box_mesh((-2, -0.1, -0.1), (2, 0.1, 0.1)),
+        gs.Boxes.from_poses([[1.5, 1, 0, 0, 0, 0, 1]], [[0.1, 0.1, 1]]),
+    )
+    solid = gs.Boxes.from_poses([[0, 0, 0, 0, 0, 0, 1]], [[2, 0.1, 0.1]])
+    for other in (post, box_mesh((1.4, 0.9, -1), (1.6, 1.1, 1)), gs.Convex(post.corners()[0])):
+        shell, full = (
+            gs.first_contact(x, other, (0, 0, 0), (0, 0, 0), angular_velocity_a=(0, 0, 1))
+            for x in (bar, solid if isinstance(other, gs.Boxes) else bar)
+        )
+        assert abs(shell.time[0] - full.time[0]) < 1e-6 and abs(shell.closing_speed[0] - full.closing_speed[0]) < 1e-5
+        assert shell.status[0] == gs.WILL_TOUCH and shell.certain[0] and len(shell.parts(0)) == 1
+        assert shell.time[0] <= math.atan2(0.9, 1.6) - math.asin(0.1 / math.hypot(0.9, 1.6)) <= shell.time_upper[0]
+    with pytest.raises(gs.NotAvailableError, match="accuracy='exact' is not available for bodies that turn"):
+        gs.first_contact(bar, post, (0, 0, 0), (0, 0, 0), angular_velocity_a=(0, 0, 1), accuracy="exact")
+
+
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
