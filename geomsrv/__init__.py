@@ -54,9 +54,11 @@ from geomsrv.shapes import (
     Sphere,
     Triangle,
 )
+from geomsrv.trajectory import AcceleratedMotion, Trajectory, first_contact_along
 from geomsrv.verify import verify, verify_record
 
 __all__ = [
+    "AcceleratedMotion",
     "Booleans",
     "Box",
     "Boxes",
@@ -103,6 +105,7 @@ __all__ = [
     "Shape",
     "Sphere",
     "TOUCHING",
+    "Trajectory",
     "Triangle",
     "Visibility",
     "WILL_TOUCH",
@@ -111,6 +114,7 @@ __all__ = [
     "distance",
     "distance_to_frustum",
     "first_contact",
+    "first_contact_along",
     "intersects",
     "time_to_collision",
     "verify",

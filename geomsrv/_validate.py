@@ -166,6 +166,15 @@ def rotation_matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return _core.rotation_matrices(np.ascontiguousarray(quaternions, np.float64))
 
 
+def rows(value: Any, name: str, count: int, width: int) -> NDArray[np.float64]:
+    """(n, d) or (d,) -> (n, d) or (1, d), float64."""
+    given = array(value, name)
+    found = floats(given, name, (width,) if given.ndim == 1 else (None, width)).reshape(-1, width)
+    if len(found) not in (1, count):
+        raise GeometryError(f"{name} must have shape ({width},) or ({count}, {width}), got {given.shape}")
+    return found
+
+
 def common_length(a: int, b: int) -> int:
     """Number of items of two batches, n against n or one against n."""
     if a != b and 1 not in (a, b):

@@ -76,14 +76,13 @@ def time_to_collision(
     motion = _validate.floats(twist, "twist", (3,))
     end = _validate.limit(t_max, "t_max")
     step = _validate.scalar(tolerance, "tolerance", positive=True)
-    speeds = None if velocities is None else _validate.array(velocities, "velocities")
     points = None
     if isinstance(obstacles, Polygons):
-        rest = _speeds(speeds, len(obstacles))
+        rest = _speeds(velocities, len(obstacles))
         found = [_polygons(ring, motion, obstacles, rest, end, step) for ring in rings]
     else:
         points = _validate.floats(obstacles, "obstacles", (None, 2))
-        rest = _speeds(speeds, len(points))
+        rest = _speeds(velocities, len(points))
         found = [_core.points_on_twist(ring, motion, points, rest, end, step) for ring in rings]
     status, lower, upper = found[0][:3]
     closed = min(piece[3] for piece in found)
@@ -161,11 +160,6 @@ def _ring(footprint: ArrayLike | Polygon) -> FloatArray:
         raise GeometryError(str(error).replace("vertices: ring 0", "footprint")) from None
 
 
-def _speeds(given: Any, count: int) -> FloatArray:
+def _speeds(velocities: ArrayLike | None, count: int) -> FloatArray:
     """(n, 2) or (1, 2)."""
-    if given is None:
-        return np.zeros((1, 2))
-    rows = _validate.floats(given, "velocities", (2,) if given.ndim == 1 else (None, 2)).reshape(-1, 2)
-    if len(rows) not in (1, count):
-        raise GeometryError(f"velocities must have shape (2,) or ({count}, 2), got {given.shape}")
-    return rows
+    return np.zeros((1, 2)) if velocities is None else _validate.rows(velocities, "velocities", count, 2)

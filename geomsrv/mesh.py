@@ -346,8 +346,5 @@ def _time_of(record: dict[str, Any]) -> Fraction:
 
 def _rows(value: ArrayLike, name: str, count: int) -> FloatArray:
     """(n, 3) or (3,) -> (n, 3)."""
-    given = _validate.array(value, name)
-    rows = _validate.floats(given, name, (3,) if given.ndim == 1 else (None, 3)).reshape(-1, 3)
-    if len(rows) not in (1, count):
-        raise GeometryError(f"{name} must have shape (3,) or ({count}, 3), got {given.shape}")
+    rows = _validate.rows(value, name, count, 3)
     return np.broadcast_to(rows, (count, 3))

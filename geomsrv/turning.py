@@ -63,9 +63,9 @@ def first_contact_turning(
         bodies, velocities, angular_velocities, centers, "ab", strict=True
     ):
         parts = (
-            _rows(velocity, f"velocity_{name}", count, d),
+            _validate.rows(velocity, f"velocity_{name}", count, d),
             _angular(angular, f"angular_velocity_{name}", count, flat),
-            middles(body) if center is None else _rows(center, f"center_{name}", count, d),
+            middles(body) if center is None else _validate.rows(center, f"center_{name}", count, d),
         )
         motion = np.zeros((max(len(part) for part in parts), 9))
         for k, part in enumerate(parts):
@@ -132,7 +132,7 @@ def _angular(value: ArrayLike | None, name: str, count: int, flat: bool) -> Floa
     if value is None:
         return np.zeros((1, 3))
     if not flat:
-        return _rows(value, name, count, 3)
+        return _validate.rows(value, name, count, 3)
     given = _validate.array(value, name)
     rates = _validate.floats(given, name, () if given.ndim == 0 else (None,)).reshape(-1)
     if len(rates) not in (1, count):
@@ -140,12 +140,3 @@ def _angular(value: ArrayLike | None, name: str, count: int, flat: bool) -> Floa
     turning = np.zeros((len(rates), 3))
     turning[:, 2] = rates
     return turning
-
-
-def _rows(value: ArrayLike, name: str, count: int, dimension: int) -> FloatArray:
-    """(n, d) or (d,) -> (n, d) or (1, d)."""
-    given = _validate.array(value, name)
-    rows = _validate.floats(given, name, (dimension,) if given.ndim == 1 else (None, dimension)).reshape(-1, dimension)
-    if len(rows) not in (1, count):
-        raise GeometryError(f"{name} must have shape ({dimension},) or ({count}, {dimension}), got {given.shape}")
-    return rows

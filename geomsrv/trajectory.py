@@ -1,0 +1,493 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""First contact along a planned path, or under acceleration: time is cut into pieces of constant twist.
+
+Each piece is the query for bodies that turn, whose bodies are widened by how far the motion strays from the piece; so
+what is proven of the pieces is true of the motion.  Where a piece strays too far to tell, it is halved.
+
+          x |            .-o- - -      o  listed poses, or ends of pieces
+            |        .-o'      }stray
+            |    o-'  .  .  .          pieces between them have a constant twist
+            +-------------------- t
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geomsrv import _core, _validate
+from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray
+from geomsrv.errors import GeometryError
+from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes
+
+__all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
+
+ROUNDOFF = 2.0**-53
+
+# Where a piece puts a point, relative to the coordinates involved: the matrix of a quaternion that is normalised to
+# an ulp is good to 8 u in each entry, 24 u as a matrix; the twist of a piece is found from its ends by a quotient
+# each, the angle by an arc tangent as well: 16 u of it; positions are sums of two numbers.  So 24 u and 16 u of the
+# angle of the reach, and a few of the places.
+PLACE_ROUNDING = 32.0 * ROUNDOFF
+
+# Pieces are halved until they are this small a part of the time interval asked for; what cannot be told then never can.
+FINEST = 2.0**-3
+
+
+class Piece(NamedTuple):
+    """A stretch of constant twist."""
+
+    start: float  #: [s]
+    end: float
+    turn: FloatArray  #: (3, 3) rotation at the start
+    place: FloatArray  #: (3,) origin of the body at the start [m]
+    linear: FloatArray  #: (3,) [m/s]
+    angular: FloatArray  #: (3,) [rad/s]
+    straying: float  #: how far the origin may be from where the motion has it [m]
+    leaning: float  #: how far the angle may be [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A planned path: poses with times, between which the body moves at a constant twist.
+
+    Between two poses the origin moves straight, and the body turns about it at a constant rate: by the shortest
+    rotation in space, and in the plane by the difference of the yaw angles as they are given, which may be more than a
+    turn.
+
+    Attributes
+    ----------
+    times : (k,) float64
+        Increasing [s], k >= 2.
+    poses : (k, 7) or (k, 3) float64
+        Position [m] and unit quaternion x y z w; or x, y [m] and yaw [rad] in the plane.
+
+    Raises
+    ------
+    GeometryError
+        Names the argument, the row and the fault.
+
+    Examples
+    --------
+    >>> import geomsrv as gs
+    >>> path = gs.Trajectory([0.0, 1.0, 3.0], [[0, 0, 0], [1, 0, 0], [1, 2, 1.57]])
+    >>> path.end
+    3.0
+    """
+
+    times: FloatArray
+    poses: FloatArray
+
+    def __init__(self, times: ArrayLike, poses: ArrayLike) -> None:
+        when = _validate.floats(times, "times", (None,))
+        rows = _validate.array(poses, "poses")
+        if rows.ndim != 2 or rows.shape[1] not in (3, 7):
+            raise GeometryError(f"poses must have shape (k, 7), or (k, 3) in the plane, got {rows.shape}")
+        where = _validate.poses(rows, "poses") if rows.shape[1] == 7 else _validate.floats(rows, "poses", (None, 3))
+        if len(when) != len(where) or len(when) < 2:
+            raise GeometryError(f"times and poses must be as many, at least two; got {len(when)} and {len(where)}")
+        late = np.flatnonzero(~(np.diff(when) > 0.0))
+        if len(late):
+            k = int(late[0]) + 1
+            raise GeometryError(f"times[{k}] must be later than times[{k - 1}] = {when[k - 1]:g}, got {when[k]:g}")
+        for name, value in (("times", when), ("poses", where)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def planar(self) -> bool:
+        """Whether it is in the plane."""
+        return bool(self.poses.shape[1] == 3)
+
+    @property
+    def start(self) -> float:
+        """Time of the first pose [s]."""
+        return float(self.times[0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last pose [s]."""
+        return float(self.times[-1])
+
+    def pieces(self) -> list[tuple[float, float]]:
+        """Times of neighbouring poses."""
+        when = self.times.tolist()
+        return list(zip(when, when[1:], strict=False))
+
+    def piece(self, start: float, end: float) -> Piece:
+        """From one pose to the next."""
+        k = int(np.searchsorted(self.times, start))
+        duration = end - start
+        here, there = self.poses[k], self.poses[k + 1]
+        if self.planar:
+            place = np.array([here[0], here[1], 0.0])
+            linear = np.array([there[0] - here[0], there[1] - here[1], 0.0]) / duration
+            angular = np.array([0.0, 0.0, there[2] - here[2]]) / duration
+            return Piece(start, end, _about_z(here[2]), place, linear, angular, 0.0, 0.0)
+        turn = _validate.rotation_matrices(here[None, 3:])[0]
+        linear, angular = (there[:3] - here[:3]) / duration, _rotation_between(here[3:], there[3:]) / duration
+        return Piece(start, end, turn, here[:3], linear, angular, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AcceleratedMotion:
+    """A motion of second order: constant linear and angular acceleration.
+
+    The origin is at ``p + v t + a t^2 / 2``; the body turns about it, and about a fixed axis, by the angle
+    ``w t + b t^2 / 2``.
+
+    Attributes
+    ----------
+    pose : (7,) or (3,) float64
+        At t = 0: position [m] and unit quaternion x y z w; or x, y [m] and yaw [rad] in the plane.
+    velocity, acceleration : (3,) or (2,) float64
+        [m/s], [m/s^2], world frame.
+    angular_velocity, angular_acceleration : (3,) float64 or float
+        [rad/s], [rad/s^2], world frame; in space about the same axis, in the plane numbers.
+    duration : float
+        [s], > 0.
+
+    Raises
+    ------
+    GeometryError
+        Names the argument and the fault.
+
+    Examples
+    --------
+    >>> import geomsrv as gs
+    >>> braking = gs.AcceleratedMotion([0, 0, 0], [2.0, 0], acceleration=[-1.0, 0], duration=2.0)
+    >>> wall = gs.Polygons.from_list([[(1.75, -1), (1.75, 1)]])
+    >>> gs.first_contact_along(gs.Polygon([(-0.25, 0), (0.25, 0)]), braking, wall).time.round(6)
+    array([1.])
+    """
+
+    pose: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    angular_velocity: FloatArray
+    angular_acceleration: FloatArray
+    duration: float
+
+    def __init__(
+        self,
+        pose: ArrayLike,
+        velocity: ArrayLike,
+        *,
+        acceleration: ArrayLike,
+        angular_velocity: ArrayLike | None = None,
+        angular_acceleration: ArrayLike | None = None,
+        duration: float,
+    ) -> None:
+        place = _validate.array(pose, "pose")
+        if place.shape not in ((3,), (7,)):
+            raise GeometryError(f"pose must have shape (7,), or (3,) in the plane, got {place.shape}")
+        flat = place.shape == (3,)
+        where = _validate.floats(place, "pose", (3,)) if flat else _validate.poses(place[None], "pose")[0]
+        along = [
+            _validate.floats(value, name, (2 if flat else 3,))
+            for name, value in (("velocity", velocity), ("acceleration", acceleration))
+        ]
+        about = []
+        for name, value in (("angular_velocity", angular_velocity), ("angular_acceleration", angular_acceleration)):
+            given = np.zeros(() if flat else 3) if value is None else _validate.array(value, name)
+            rate = _validate.floats(given, name, () if flat else (3,))
+            about.append(np.array([0.0, 0.0, float(rate)]) if flat else rate)
+        # A multiple of a vector, rounded, is along it to an ulp.
+        if np.linalg.norm(np.cross(about[0], about[1])) > PLACE_ROUNDING * np.linalg.norm(about[0]) * np.linalg.norm(
+            about[1]
+        ):
+            raise GeometryError("angular_acceleration must be about the axis of angular_velocity")
+        end = _validate.scalar(duration, "duration", positive=True)
+        for name, array in zip(
+            ("pose", "velocity", "acceleration", "angular_velocity", "angular_acceleration"),
+            (where, *along, *about),
+            strict=True,
+        ):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "duration", end)
+
+    @property
+    def planar(self) -> bool:
+        """Whether it is in the plane."""
+        return self.pose.shape == (3,)
+
+    @property
+    def start(self) -> float:
+        """0."""
+        return 0.0
+
+    @property
+    def end(self) -> float:
+        """The duration [s]."""
+        return self.duration
+
+    def pieces(self) -> list[tuple[float, float]]:
+        """All of it."""
+        return [(0.0, self.duration)]
+
+    def piece(self, start: float, end: float) -> Piece:
+        """A chord: from where the body is at the start to where it is at the end."""
+        length = end - start
+        # The mean rate over the piece is that in its middle; a parabola is off its chord by a t^2 / 8 in between.
+        middle, over = start + 0.5 * length, 0.125 * length * length
+        linear = self.velocity + middle * self.acceleration
+        angular = self.angular_velocity + middle * self.angular_acceleration
+        angle = start * (self.angular_velocity + 0.5 * start * self.angular_acceleration)
+        place = self.pose[: 2 if self.planar else 3] + start * (self.velocity + 0.5 * start * self.acceleration)
+        if self.planar:
+            turn, place, linear = _about_z(self.pose[2] + angle[2]), np.append(place, 0.0), np.append(linear, 0.0)
+        else:
+            turn = _about(angle) @ _validate.rotation_matrices(self.pose[None, 3:])[0]
+        stray, lean = (float(np.linalg.norm(x)) * over for x in (self.acceleration, self.angular_acceleration))
+        lean += PLACE_ROUNDING * float(np.linalg.norm(angle))
+        return Piece(start, end, turn, place, linear, angular, stray, lean)
+
+
+Motion = Trajectory | AcceleratedMotion
+
+
+def first_contact_along(
+    body: Polygon | Box | Convex,
+    motion: Motion,
+    obstacles: Polygons | Boxes | Polytopes,
+    *,
+    velocities: ArrayLike | None = None,
+    tolerance: float = 1e-6,
+) -> CollisionTimes:
+    """When a body on its way first touches obstacles.
+
+    Parameters
+    ----------
+    body : Polygon (2D), Box or Convex (3D)
+        In its own frame, which the motion places.
+    motion : Trajectory or AcceleratedMotion
+    obstacles : Polygons (2D), Boxes or Polytopes (3D)
+        Where they are at the start of the motion, world frame.
+    velocities : (n, d) or (d,) float, optional
+        Constant velocities of the obstacles [m/s].  By default they rest.
+    tolerance : float
+        Widest time interval of WILL_TOUCH [s], > 0.
+
+    Returns
+    -------
+    CollisionTimes
+        Times are those of the motion.  ``time`` is ``time_lower``: free of contact before it, for the motion as its
+        class describes it; contact is proven until ``time_upper``, which is inf where it is not.
+        At the start OVERLAPPING is proven; TOUCHING may be either.  ``cost.counts``: "pieces" looked at.
+
+    Raises
+    ------
+    GeometryError
+        Names the argument, the index and the fault.
+
+    References
+    ----------
+    Conservative advancement (Mirtich, 1996) on pieces of constant twist.
+
+    Examples
+    --------
+    Past a corner: straight on, then a quarter turn on the spot.
+
+    >>> import geomsrv as gs
+    >>> path = gs.Trajectory([0.0, 2.0, 4.0], [[0, 0, 0], [2, 0, 0], [2, 0, 1.5707963]])
+    >>> bar = gs.Polygon([(-1, -0.1), (1, -0.1), (1, 0.1), (-1, 0.1)])
+    >>> posts = gs.Polygons.from_list([[(2.0, 0.8)], [(2.5, 0.05)], [(0, 2)]])
+    >>> found = gs.first_contact_along(bar, path, posts)
+    >>> found.status, found.time.round(4)
+    (array([1, 1, 0], dtype=uint8), array([3.8404, 1.5   ,    nan]))
+    """
+    begin = time.perf_counter_ns()
+    step = _validate.scalar(tolerance, "tolerance", positive=True)
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"motion must be Trajectory or AcceleratedMotion, got {type(motion).__name__}")
+    vertices = _vertices(body, motion.planar)
+    kinds = (Polygons,) if motion.planar else (Boxes, Polytopes)
+    if not isinstance(obstacles, kinds):
+        names = " or ".join(kind.__name__ for kind in kinds)
+        raise GeometryError(f"obstacles must be {names} for such a motion, got {type(obstacles).__name__}")
+    dimension, count = (2 if motion.planar else 3), len(obstacles)
+    drift = _speeds(velocities, count, dimension)
+    search = _Search(vertices, motion, obstacles, drift, step)
+    status, lower, upper = search.run()
+    certain = (status < ContactStatus.UNSUPPORTED) & ((status != ContactStatus.TOUCHING) | (upper == motion.start))
+    counts = {"pieces": search.looked_at}
+    return CollisionTimes(
+        status=status,
+        time=lower.copy(),
+        time_lower=lower,
+        time_upper=upper,
+        certain=certain,
+        cost=Cost(time.perf_counter_ns() - begin, "float64", counts),
+    )
+
+
+class _Search:
+    """Obstacle by obstacle, the first piece with a contact, halved until it can be told."""
+
+    def __init__(
+        self,
+        vertices: FloatArray,
+        motion: Motion,
+        obstacles: Polygons | Boxes | Polytopes,
+        drift: FloatArray,
+        step: float,
+    ) -> None:
+        self._vertices, self._motion, self._drift, self._step = vertices, motion, drift, step
+        self._reach = float(np.linalg.norm(vertices, axis=1).max())
+        self._obstacles = obstacles
+        corner = obstacles.center if isinstance(obstacles, Boxes) else obstacles.vertices
+        self._far = float(np.abs(corner).sum(axis=1).max(initial=0.0))
+        if isinstance(obstacles, Boxes):
+            self._far += float(np.linalg.norm(obstacles.half_extents, axis=1).max(initial=0.0))
+        count = len(obstacles)
+        self.status = np.full(count, ContactStatus.NEVER, np.uint8)
+        self.lower, self.upper = np.full(count, np.nan), np.full(count, np.nan)
+        self.looked_at = 0
+
+    def run(self) -> tuple[ByteArray, FloatArray, FloatArray]:
+        """Status, lower and upper of every obstacle."""
+        open_rows: IntArray = np.arange(len(self.status))
+        for start, end in self._motion.pieces():
+            if not len(open_rows):
+                break
+            open_rows = self._follow(open_rows, start, end)
+        return self.status, self.lower, self.upper
+
+    def _follow(self, rows: IntArray, start: float, end: float) -> IntArray:
+        """Settle what has a contact between two times; returns the rows that have none."""
+        piece = self._motion.piece(start, end)
+        status, lower, upper, fine = self._ask(rows, piece)
+        free = status == ContactStatus.NEVER
+        at_start = start == self._motion.start
+        proven = np.isfinite(upper) & (upper - lower <= self._step)
+        settled = ~free & (proven | fine)
+        if at_start:
+            settled |= status == ContactStatus.OVERLAPPING
+            settled &= (status != ContactStatus.TOUCHING) | fine
+        done, vague = rows[settled], rows[~free & ~settled]
+        if len(done):
+            self._settle(done, status[settled], lower[settled], upper[settled], proven[settled], at_start)
+        if len(vague):
+            middle = start + 0.5 * (end - start)
+            vague = self._follow(self._follow(vague, start, middle), middle, end)
+        return np.sort(np.concatenate([rows[free], vague]))
+
+    def _settle(
+        self,
+        rows: IntArray,
+        status: ByteArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        proven: BoolArray,
+        at_start: bool,
+    ) -> None:
+        """Contact within a piece is contact to come, unless it is the first one and there from the start."""
+        there = (status == ContactStatus.OVERLAPPING) | (status == ContactStatus.TOUCHING)
+        named = np.where(proven, ContactStatus.WILL_TOUCH, ContactStatus.GRAZING)
+        named[status == ContactStatus.NOT_CONVERGED] = ContactStatus.NOT_CONVERGED
+        self.status[rows] = np.where(there, status, named) if at_start else named
+        self.lower[rows], self.upper[rows] = lower, upper
+
+    def _ask(self, rows: IntArray, piece: Piece) -> tuple[ByteArray, FloatArray, FloatArray, bool]:
+        """The engine's answer on a piece, in times of the motion, and whether it is as fine as it can be."""
+        self.looked_at += len(rows)
+        flat, length = self._motion.planar, piece.end - piece.start
+        placed = self._vertices @ piece.turn.T + piece.place
+        since = piece.start - self._motion.start
+        body = (placed[:, :2].copy() if flat else placed, np.array([0, len(placed)]))
+        motion = np.concatenate([piece.linear, piece.angular, piece.place])[None]
+        others, motions = self._others(rows, since)
+        rounding = PLACE_ROUNDING * (
+            self._reach * (1.0 + length * float(np.linalg.norm(piece.angular)))
+            + float(np.abs(piece.place).sum() + length * np.abs(piece.linear).sum())
+            + self._far
+            + float(np.abs(self._drift).max(initial=0.0)) * (since + length)
+        )
+        stray = piece.straying + piece.leaning * self._reach
+        slack = np.array([[0.0, rounding + stray, 0.0]])
+        found = _core.first_contact_turning(body, others, motion, motions, length, 0.5 * self._step, slack)
+        shift = np.where(np.isnan(found[1]), 0.0, piece.start)
+        # Rounding of the sum; the piece's own ends are exact.
+        lower = np.maximum(np.nextafter(found[1] + shift, -np.inf), piece.start)
+        upper = np.nextafter(found[2] + shift, np.inf)
+        upper = np.where(found[2] == 0.0, piece.start, upper)
+        fine = stray <= rounding or length <= FINEST * self._step
+        return found[0], lower, upper, fine
+
+    def _others(self, rows: IntArray, since: float) -> tuple[tuple[FloatArray | IntArray, ...], FloatArray]:
+        """The obstacles of some rows after a while, and their motions."""
+        drift = self._drift[rows if len(self._drift) > 1 else np.zeros(len(rows), np.int64)]
+        motions = np.zeros((len(rows), 9))
+        motions[:, : drift.shape[1]] = drift
+        shift = since * drift
+        if isinstance(self._obstacles, Boxes):
+            center = self._obstacles.center[rows] + shift
+            motions[:, 6:] = center
+            axes, half = self._obstacles.axes[rows], self._obstacles.half_extents[rows]
+            return (center, np.ascontiguousarray(axes), np.ascontiguousarray(half)), motions
+        offsets = self._obstacles.offsets
+        counts = np.diff(offsets)[rows]
+        ends = np.concatenate([[0], np.cumsum(counts)])
+        source = np.arange(ends[-1]) + np.repeat(offsets[rows] - ends[:-1], counts)
+        vertices = self._obstacles.vertices[source] + np.repeat(shift, counts, axis=0)
+        motions[:, 6 : 6 + vertices.shape[1]] = vertices[ends[:-1]]
+        return (vertices, ends), motions
+
+
+def _vertices(body: Polygon | Box | Convex, flat: bool) -> FloatArray:
+    """(m, 3) vertices of a body in its own frame."""
+    if flat:
+        if not isinstance(body, Polygon):
+            raise GeometryError(f"body must be Polygon for a motion in the plane, got {type(body).__name__}")
+        return np.column_stack([body.vertices, np.zeros(len(body.vertices))])
+    if isinstance(body, Box):
+        return np.array(list(_corners())) * body.half_extents
+    if not isinstance(body, Convex):
+        raise GeometryError(f"body must be Box or Convex for a motion in space, got {type(body).__name__}")
+    return body.vertices
+
+
+def _corners() -> Iterator[tuple[float, float, float]]:
+    for number in range(8):
+        yield tuple(1.0 if number >> k & 1 else -1.0 for k in range(3))  # type: ignore[misc]
+
+
+def _speeds(velocities: ArrayLike | None, count: int, dimension: int) -> FloatArray:
+    """(n, d) or (1, d)."""
+    if velocities is None:
+        return np.zeros((1, dimension))
+    return _validate.rows(velocities, "velocities", count, dimension)
+
+
+def _about_z(angle: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _about(angle: FloatArray) -> FloatArray:
+    """Rotation about a vector by its length."""
+    size = float(np.linalg.norm(angle))
+    axis = angle / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+    quaternion = np.append(np.sin(0.5 * size) * axis, np.cos(0.5 * size))
+    turn: FloatArray = _validate.rotation_matrices(quaternion[None])[0]
+    return turn
+
+
+def _rotation_between(here: FloatArray, there: FloatArray) -> FloatArray:
+    """Rotation vector, world frame, of the shortest rotation from one orientation to another."""
+    va, wa, vb, wb = -here[:3], here[3], there[:3], there[3]
+    vector = wb * va + wa * vb + np.cross(vb, va)
+    scalar = wb * wa - vb @ va
+    size = float(np.linalg.norm(vector))
+    if size == 0.0:
+        return np.zeros(3)
+    angle = 2.0 * np.arctan2(size, abs(scalar))
+    rotation: FloatArray = vector * (np.copysign(angle, scalar) / size)
+    return rotation
