@@ -32,6 +32,9 @@ NEAR = {"float64": DECIDABLE, "float32": Fraction(1, 2**11)}
 # Subnormal numbers are this coarse; a few roundings of that much are always forgiven.
 SUBNORMAL = Fraction(1, 2**1071)
 
+# Of first contact of bodies that turn the time is asked for to this share of the window.
+TURNING_TOLERANCE = 1e-9
+
 # Distances of peers must be this good, as a share of the scene, beyond what is known of their iterations: it is the
 # tolerance that they set themselves.
 PEER_NEAR = Fraction(1, 10**6)
@@ -172,6 +175,40 @@ def _first_contact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]
         yield _contact_set(answer.points, motion, truth.scale)
 
 
+def _turning_contact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]:
+    """First contact of bodies that turn, against times that bracket it."""
+    assert truth.motion is not None
+    given, motion = case.given, truth.motion
+    a, b = case.bodies
+    flat = case.kind == "polygon2d_turning"
+    answer = first_contact(
+        a,
+        b,
+        given["velP"],
+        given["velQ"],
+        t_max=given["tmax"],
+        accuracy=accuracy,
+        angular_velocity_a=given["angP"][2] if flat else given["angP"],
+        angular_velocity_b=given["angQ"][2] if flat else given["angQ"],
+        center_a=given["cenP"],
+        center_b=given["cenQ"],
+        tolerance=TURNING_TOLERANCE * given["tmax"],
+    )
+    status, certain = ContactStatus(int(answer.status[0])), bool(answer.certain[0])
+    open_ended = motion.status == ContactStatus.GRAZING and status in (ContactStatus.WILL_TOUCH, ContactStatus.NEVER)
+    said = f"{status.name}{'' if certain else ', uncertain'}"
+    yield _boolean(status == motion.status or open_ended, certain, False, said)
+    low, high = float(answer.time_lower[0]), float(answer.time_upper[0])
+    if motion.status == ContactStatus.NEVER or status == ContactStatus.NEVER:
+        return
+    assert motion.time is not None
+    # Apart until `low`, in contact by `high`: this is told of every outcome, and has to hold.
+    latest = motion.time_upper
+    holds = low <= high and (latest is None or Fraction(low) <= latest)
+    holds = holds and (high == math.inf or motion.time <= Fraction(high))
+    yield _boolean(holds, True, False, f"time in [{low!r}, {high!r}], should be {float(motion.time)!r}")
+
+
 def _time_of_impact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]:
     """A moving field case, as a client of the scene's services asks it."""
     assert truth.motion is not None
@@ -215,6 +252,8 @@ _QUERIES: dict[str, tuple[_Query, ...]] = {
     "polygon2d_distance": (_distance, _intersects),
     "polygon2d_moving": (_first_contact,),
     "polyhedra_moving": (_first_contact,),
+    "polygon2d_turning": (_turning_contact,),
+    "polyhedra_turning": (_turning_contact,),
     "signed_distance": (_distance, _intersects),
     "distance": (_distance, _intersects),
     "segment_segment": (_distance, _intersects),

@@ -56,6 +56,8 @@ KINDS = (
     "polygon2d_distance",
     "polygon2d_moving",
     "polyhedra_moving",
+    "polygon2d_turning",
+    "polyhedra_turning",
     "signed_distance",
     "distance",
     "segment_segment",
@@ -66,7 +68,7 @@ KINDS = (
 )
 
 #: Kinds that ask when bodies first touch.
-MOVING = ("polygon2d_moving", "polyhedra_moving", "toi", "toi_rotating")
+MOVING = ("polygon2d_moving", "polyhedra_moving", "polygon2d_turning", "polyhedra_turning", "toi", "toi_rotating")
 
 # From this share of the scene on, doubles that first subtract a common origin can tell apart from touching: 53 bits,
 # less 13 for the operations of a query and their conditioning.
@@ -98,6 +100,9 @@ class Motion:
         Corners of the contact set.
     time_scale : Fraction
         By how much a rounding error of the size of the whole scene would move `time`.
+    time_upper : Fraction or None
+        Of bodies that turn, whose times are no rational numbers: apart until `time`, in contact at `time_upper`; of
+        GRAZING ones it is open whether they meet later.
     """
 
     status: ContactStatus
@@ -105,6 +110,7 @@ class Motion:
     last_time: Fraction | None = None
     contact: tuple[tuple[Fraction, ...], ...] = ()
     time_scale: Fraction = Fraction(0)
+    time_upper: Fraction | None = None
 
 
 @dataclass(frozen=True)
@@ -184,8 +190,10 @@ class Case:
                 return _boxes(given["box0"]), _boxes(given["box1"])
             case "polytope_distance":
                 return Polytopes.from_list([given["P"]]), Polytopes.from_list([given["Q"]])
-            case "polyhedra_moving":
+            case "polyhedra_moving" | "polyhedra_turning":
                 return tuple(Polytopes.from_list([given[side]["vertices"]]) for side in "PQ")
+            case "polygon2d_turning":
+                return tuple(Polygons.from_list([given[side]["vertices"]]) for side in "PQ")
             case "polygon2d_distance" | "polygon2d_moving":
                 return Polygons.from_list([given["P"]]), Polygons.from_list([given["Q"]])
         first, second = given["shapes"]

@@ -25,10 +25,9 @@ from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray
 from geomsrv.errors import GeometryError
 from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes
+from geomsrv.world import ROUNDOFF
 
 __all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
-
-ROUNDOFF = 2.0**-53
 
 # Where a piece puts a point, relative to the coordinates involved: the matrix of a quaternion that is normalised to
 # an ulp is good to 8 u in each entry, 24 u as a matrix; the twist of a piece is found from its ends by a quotient

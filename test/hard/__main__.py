@@ -36,9 +36,10 @@ def main() -> int:
     reports = (generated, corpus, field)
     for line in [line for report in reports for line in report.wrong if line.split(":")[0] in TIERS]:
         print(line)
-    count = arguments.count
+    fewer = suite.fewer("polyhedra_turning", arguments.count)
+    size = f"{arguments.count} cases of each class, {fewer} of bodies that turn."
     parts = {
-        "generated": f"{count} cases of each class.\n\n{table(generated, ('kind', 'class'))}",
+        "generated": f"{size}\n\n{table(generated, ('kind', 'class'))}",
         "corpus": table(corpus, ("kind",)),
         "field": table(field, ("kind",)),
         "missing": missing(),
@@ -55,7 +56,7 @@ def cases(count: int, kinds: list[str] | None) -> Iterator[Case]:
     """The generated ones."""
     for kind, group in suite.classes():
         if not kinds or kind in kinds:
-            yield from suite.generate(kind, group, count)
+            yield from suite.generate(kind, group, suite.fewer(kind, count))
 
 
 def table(report: Report, heads: tuple[str, ...]) -> str:

@@ -9,10 +9,12 @@ from fractions import Fraction
 from typing import Any
 
 from oracle import frustum_box, moving_polytope, point_frustum, polygon, polytope
+from oracle.turning import apart_until, meet_at
 from oracle.vectors import Vector, add, dot, exact, scale, squared_norm, sub
 
 from geomsrv.answers import ContactStatus, CullState
 from geomsrv.hard_cases import Motion, Truth, decides, time_scale
+from hard import turning
 from hard.frustum_box import corners, literal_frustum
 
 
@@ -122,6 +124,34 @@ def motion_of(found: polygon.FirstContact, size: Fraction) -> Motion:
     return Motion(status, found.time, found.last_time, tuple(found.contact), time_scale(size, found.normal_speed_sq))
 
 
+#: Steps of the oracle, after which it leaves open what happens later: most of those are grazes.
+MOST_STEPS = 120
+
+
+def of_turning(given: dict[str, Any]) -> Truth:
+    """By 240 bits: what is on both sides of first contact, or apart throughout."""
+    a, b = turning.bodies(given)
+    size, end = extent(a.vertices, b.vertices), Fraction(given["tmax"])
+    # In the plane, polygons that overlap are no flat hulls that touch.
+    rings = [[tuple(map(Fraction, v)) for v in given[side]["vertices"]] for side in "PQ"]
+    start = (polygon if len(rings[0][0]) == 2 else polytope).separation(*rings).signed_square
+    if start <= 0:
+        # What only touches may part at once: then nobody can prove contact.
+        status = ContactStatus.OVERLAPPING if start else ContactStatus.TOUCHING
+        return Truth(start, start, size, decides(start, size), motion=Motion(status, Fraction(0), Fraction(0)))
+    apart = apart_until(a, b, end, MOST_STEPS)
+    if apart >= end:
+        return Truth(Fraction(1), Fraction(1), size, False, motion=Motion(ContactStatus.NEVER))
+    for k in range(110, 6, -4):
+        if (met := apart + Fraction(1, 1 << k)) <= end and meet_at(a, b, met):
+            # Who comes into contact at once and is in contact a thousandth later, does not graze.
+            later = apart * Fraction(1001, 1000)
+            deep = decides(start, size) and k > 40 and later <= end and meet_at(a, b, later)
+            hit = Motion(ContactStatus.WILL_TOUCH, apart, time_upper=met)
+            return Truth(Fraction(-1), Fraction(-1), size, deep, motion=hit)
+    return Truth(Fraction(-1), Fraction(1), size, False, motion=Motion(ContactStatus.GRAZING, apart))
+
+
 TRUTHS = {
     "frustum_box": of_frustum_box,
     "frustum_box_distance": of_frustum_box_distance,
@@ -131,4 +161,6 @@ TRUTHS = {
     "polygon2d_distance": of_polygons,
     "polygon2d_moving": of_moving,
     "polyhedra_moving": of_moving_solids,
+    "polygon2d_turning": of_turning,
+    "polyhedra_turning": of_turning,
 }
