@@ -82,7 +82,7 @@ def test_corpus(case: Case) -> None:
 
 
 def test_generated_cases_are_hard() -> None:
-    """Every kind has cases that doubles decide and cases that they cannot, contact and none; those that turn together."""
+    """Every kind has cases that doubles decide and cases that they cannot, contact and none; the turning together."""
     met: dict[bool, set[bool | None]] = {False: set(), True: set()}
     for kind in TRUTHS:
         found = [
