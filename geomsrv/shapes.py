@@ -62,7 +62,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return copy
 
 
-def _freeze(value: Any, **fields: Any) -> None:
+def freeze(value: Any, **fields: Any) -> None:
     """Set fields of a frozen dataclass, arrays as read-only copies."""
     for name, field in fields.items():
         object.__setattr__(value, name, frozen(field) if isinstance(field, np.ndarray) else field)
@@ -157,7 +157,7 @@ class Frustum:
     ) -> None:
         window = _window(left, up, bounds, ("left", "up"))
         near_depth, far_depth = _depths(near, far)
-        _freeze(
+        freeze(
             self,
             origin=_validate.floats(origin, "origin", (3,)),
             axes=_validate.axes(axes, "axes", (3, 3)),
@@ -343,7 +343,7 @@ class Frustum2D:
     ) -> None:
         window = _window(left, None, bounds, ("left",))
         near_depth, far_depth = _depths(near, far)
-        _freeze(
+        freeze(
             self,
             origin=_validate.floats(origin, "origin", (2,)),
             axes=_validate.axes(axes, "axes", (2, 2)),
@@ -391,7 +391,7 @@ class Boxes:
         if (half < 0.0).any():
             i = int(np.argmax((half < 0.0).any(axis=1)))
             raise GeometryError(f"half_extents[{i}] must be >= 0, got {half[i].tolist()}")
-        _freeze(self, center=middle, axes=rows, half_extents=half)
+        freeze(self, center=middle, axes=rows, half_extents=half)
 
     @classmethod
     def from_poses(cls, poses: ArrayLike, half_extents: ArrayLike) -> Boxes:
@@ -485,7 +485,7 @@ class Polygons(_Ragged):
         if fault:
             place = f", at its vertex {vertex}" if vertex >= 0 else ""
             raise GeometryError(f"vertices: ring {ring} is {fault}{place}")
-        _freeze(self, vertices=points, offsets=ends)
+        freeze(self, vertices=points, offsets=ends)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -512,7 +512,7 @@ class Polytopes(_Ragged):
 
     def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
         points = _validate.floats(vertices, "vertices", (None, 3))
-        _freeze(self, vertices=points, offsets=_validate.offsets(offsets, "offsets", len(points), 1))
+        freeze(self, vertices=points, offsets=_validate.offsets(offsets, "offsets", len(points), 1))
 
 
 # ----------------------------------------------------------------------------- single shapes, their own frame
@@ -533,7 +533,7 @@ class Sphere(Shape):
     kind: ClassVar[str] = "sphere"
 
     def __init__(self, radius: float) -> None:
-        _freeze(self, radius=_validate.scalar(radius, "radius", minimum=0.0))
+        freeze(self, radius=_validate.scalar(radius, "radius", minimum=0.0))
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -544,7 +544,7 @@ class _Round(Shape):
     length: float
 
     def __init__(self, radius: float, length: float) -> None:
-        _freeze(
+        freeze(
             self,
             radius=_validate.scalar(radius, "radius", minimum=0.0),
             length=_validate.scalar(length, "length", minimum=0.0),
@@ -580,7 +580,7 @@ class Ellipsoid(Shape):
         sizes = _validate.floats(radii, "radii", (3,))
         if not (sizes > 0.0).all():
             raise GeometryError(f"radii must be > 0, got {sizes.tolist()}")
-        _freeze(self, radii=sizes)
+        freeze(self, radii=sizes)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -594,7 +594,7 @@ class Box(Shape):
         half = _validate.floats(half_extents, "half_extents", (3,))
         if (half < 0.0).any():
             raise GeometryError(f"half_extents must be >= 0, got {half.tolist()}")
-        _freeze(self, half_extents=half)
+        freeze(self, half_extents=half)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -617,7 +617,7 @@ class HalfSpace(Shape):
         distance = level / largest / length
         if not np.isfinite(distance):
             raise GeometryError(f"offset / |normal| must be finite, got {level} / |{direction.tolist()}|")
-        _freeze(self, normal=scaled / length, offset=distance)
+        freeze(self, normal=scaled / length, offset=distance)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -631,7 +631,7 @@ class Convex(Shape):
         points = _validate.floats(vertices, "vertices", (None, 3))
         if len(points) == 0:
             raise GeometryError("vertices must hold at least one point")
-        _freeze(self, vertices=points)
+        freeze(self, vertices=points)
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -674,7 +674,7 @@ class Mesh(Shape):
         if wrong.any():
             i = int(np.argmax(wrong.any(axis=1)))
             raise GeometryError(f"triangles[{i}] refers to a vertex outside 0..{len(points) - 1}: {faces[i].tolist()}")
-        _freeze(self, vertices=points, triangles=faces.astype(np.int64))
+        freeze(self, vertices=points, triangles=faces.astype(np.int64))
 
 
 class _Points(Shape):
@@ -684,7 +684,7 @@ class _Points(Shape):
 
     def _set(self, **points: ArrayLike) -> None:
         rows = [_validate.floats(point, name, (3,)) for name, point in points.items()]
-        _freeze(self, vertices=np.stack(rows), **dict(zip(points, rows, strict=True)))
+        freeze(self, vertices=np.stack(rows), **dict(zip(points, rows, strict=True)))
 
 
 class Triangle(_Points):
@@ -726,7 +726,7 @@ class Polygon(Shape):
         if len(points) == 0:
             raise GeometryError("vertices must hold at least one point")
         Polygons(points, [0, len(points)])
-        _freeze(self, vertices=points)
+        freeze(self, vertices=points)
 
 
 # -------------------------------------------------------------------------------------- what the engine reads

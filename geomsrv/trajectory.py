@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray
 from geomsrv.errors import GeometryError
-from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes
+from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze
 from geomsrv.world import ROUNDOFF
 
 __all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
@@ -95,9 +95,7 @@ class Trajectory:
         if len(late):
             k = int(late[0]) + 1
             raise GeometryError(f"times[{k}] must be later than times[{k - 1}] = {when[k - 1]:g}, got {when[k]:g}")
-        for name, value in (("times", when), ("poses", where)):
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        freeze(self, times=when, poses=where)
 
     @property
     def planar(self) -> bool:
@@ -198,19 +196,12 @@ class AcceleratedMotion:
             rate = _validate.floats(given, name, () if flat else (3,))
             about.append(np.array([0.0, 0.0, float(rate)]) if flat else rate)
         # A multiple of a vector, rounded, is along it to an ulp.
-        if np.linalg.norm(np.cross(about[0], about[1])) > PLACE_ROUNDING * np.linalg.norm(about[0]) * np.linalg.norm(
-            about[1]
-        ):
+        across, sizes = np.linalg.norm(np.cross(about[0], about[1])), np.linalg.norm(about, axis=1)
+        if across > PLACE_ROUNDING * sizes[0] * sizes[1]:
             raise GeometryError("angular_acceleration must be about the axis of angular_velocity")
         end = _validate.scalar(duration, "duration", positive=True)
-        for name, array in zip(
-            ("pose", "velocity", "acceleration", "angular_velocity", "angular_acceleration"),
-            (where, *along, *about),
-            strict=True,
-        ):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-        object.__setattr__(self, "duration", end)
+        freeze(self, pose=where, velocity=along[0], acceleration=along[1], duration=end)
+        freeze(self, angular_velocity=about[0], angular_acceleration=about[1])
 
     @property
     def planar(self) -> bool:

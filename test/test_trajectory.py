@@ -280,6 +280,20 @@ def test_bad_input_is_named(make, text):
         make()
 
 
+def test_given_arrays_stay_the_callers():
+    """A motion keeps copies: what it was made of can be written to, and changes nothing."""
+    times, poses = np.array([0.0, 1.0]), np.zeros((2, 3))
+    pose, velocity, acceleration = np.zeros(3), np.zeros(2), np.zeros(2)
+    path = gs.Trajectory(times, poses)
+    motion = gs.AcceleratedMotion(pose, velocity, acceleration=acceleration, duration=1.0)
+    for array in (times, poses, pose, velocity, acceleration):
+        array += 1.0
+    assert path.times.tolist() == [0.0, 1.0] and not path.poses.any()
+    assert not (motion.pose.any() or motion.velocity.any() or motion.acceleration.any())
+    with pytest.raises(ValueError, match="read-only"):
+        path.times[0] = 1.0
+
+
 def along(**changed):
     given = {
         "body": SQUARE,
