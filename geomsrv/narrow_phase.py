@@ -27,15 +27,16 @@ from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 __all__ = [
     "ContactRows",
     "DistanceRows",
+    "at_rest",
     "distance_rows",
     "end_to_end",
     "first_contact_rows",
     "followed_solids",
+    "near_at_rest",
+    "placed",
     "placed_boxes",
     "placed_distances",
     "placed_hulls",
-    "near_at_rest",
-    "placed",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -586,6 +587,14 @@ def _spinning_polygons(
     return rows, _unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
 
 
+def at_rest(world: World, pairs: IntArray, horizon: float) -> BoolArray:
+    """(k,) bool: pairs that rest relative to each other; where only the present is asked about, all do."""
+    motion = world.twists[pairs]
+    resting: BoolArray = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[pairs].any(axis=1)
+    resting &= ~world.velocity_uncertainty[pairs].any(axis=1)
+    return resting | (horizon == 0.0)
+
+
 def near_at_rest(
     world: World, pairs: IntArray, horizon: float, counts: Counter[str], margin: float
 ) -> tuple[ContactRows, Unsupported]:
@@ -626,10 +635,7 @@ def _solid_contacts(
 ) -> tuple[ContactRows, Unsupported]:
     """Solids that are not followed: in contact now, at rest relative to each other and so never, or unsupported."""
     rows, missing = distance_rows(world, pairs, True, tier, counts)
-    motion = world.twists[rows.pairs]
-    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[rows.pairs].any(axis=1)
-    resting &= ~world.velocity_uncertainty[rows.pairs].any(axis=1)
-    resting |= horizon == 0.0
+    resting = at_rest(world, rows.pairs, horizon)
     touching, may_touch = rows.distance <= 0.0, rows.lower <= 0.0
     by_volumes = np.full(len(touching), tier == "bound")  # which tell neither how deep, nor where
     status = np.select(

@@ -22,6 +22,7 @@ from geomsrv.mesh_pairs import mesh_contacts, sliding_meshes
 from geomsrv.narrow_phase import (
     ContactRows,
     Unsupported,
+    at_rest,
     count_kinds,
     first_contact_rows,
     followed_solids,
@@ -121,13 +122,11 @@ def _approaches(
     world: World, pairs: IntArray, horizon: float, counts: Counter[str], margin: float
 ) -> tuple[ContactRows, Unsupported]:
     """When bodies come as near as the margin: a ball that large is added to one of them."""
-    count_kinds(world, pairs, counts)
     followed = followed_in_turning(world)[pairs].all(axis=1)
+    count_kinds(world, pairs[followed], counts)
     rows = [_turning_contacts(world, pairs[followed], horizon, margin)] if followed.any() else []
     others = pairs[~followed]
-    motion = world.twists[others]
-    resting = (motion[:, 0] == motion[:, 1]).all(axis=1) & ~world.turns[others].any(axis=1)
-    resting &= ~world.velocity_uncertainty[others].any(axis=1)
+    resting = at_rest(world, others, horizon)
     near, missing = near_at_rest(world, others[resting], horizon, counts, margin)
     moving = Unsupported.of_kinds(world, others[~resting], NO_APPROACH)
     return (
@@ -150,7 +149,8 @@ def closing_speeds(world: World, rows: ContactRows) -> FloatArray:
         known = rows.points[k] is not None and not world.motion_faults.keys() & {int(a[k]), int(b[k])}
         speed[k] = np.nan
         if known:
-            at = [_velocity(world, int(row), float(rows.time[k]), rows.points[k]) for row in (a[k], b[k])]
+            points = np.vstack(rows.points[k])  # of all parts
+            at = [_velocity(world, int(row), float(rows.time[k]), points) for row in (a[k], b[k])]
             speed[k] = ((at[0] - at[1]) @ rows.normal[k]).max()
     return speed
 

@@ -129,6 +129,15 @@ def test_margin_without_motion():
     assert answer.unsupported == [("ball", "floor", "first contact at a distance (half_space-sphere) is unsupported")]
 
 
+def test_margin_where_only_the_present_is_asked_about():
+    """Whatever moves is where it is, and every pair is counted once."""
+    floor = gs.SceneObject("floor", gs.HalfSpace((0, 0, 1), 0.0))
+    falling = gs.SceneObject("ball", gs.Sphere(0.5), [0, 0, 0.75, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0])
+    answer = scene_of([floor, falling]).first_contacts(0.0, margin=0.5)
+    assert answer.status.tolist() == [ContactStatus.OVERLAPPING] and answer.unsupported == []
+    assert answer.cost.counts["narrow half_space-sphere"] == 1
+
+
 @pytest.mark.parametrize(
     ("margin", "accuracy", "text"),
     [
@@ -233,6 +242,19 @@ def test_closing_speed_is_that_of_the_distance(rng, turning):
             assert answer.closing_speed[k] == pytest.approx(ahead / 1e-3, abs=0.02 + 0.02 * turning)
             checked += 1
     assert checked >= 10
+
+
+def test_closing_speed_of_several_parts():
+    """A mesh that turns and touches now, in a point and along an edge and more: the fastest of all points counts."""
+    corners = [(0, 0, 1), (0.25, 0, 1), (0.25, 0.25, 1), (0.5, 0.5, 1), (0.75, 0.5, 2), (0.75, 0.75, 2)]
+    mesh = gs.Mesh(corners, [(0, 1, 2), (3, 4, 5)])
+    box = gs.SceneObject("a", gs.Box([1, 1, 1]), [0, 0, 0, 0, 0, 0, 1])
+    leaning = gs.SceneObject("b", mesh, [0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 1.0, 0, 0])
+    answer = scene_of([box, leaning]).first_contacts(0.0)
+    assert sorted(np.diff(answer.part_offsets).tolist()) == [1, 3]
+    # About x a point at y goes up by y: the lowest goes nowhere.
+    np.testing.assert_array_equal(answer.normal, [[0, 0, 1]])
+    assert answer.closing_speed.tolist() == [0.0]
 
 
 def test_closing_speed_of_what_touches():
