@@ -124,7 +124,7 @@ def distance_placed(
     accuracy: str = "float64",
     frusta: _F | None = None,
 ) -> _Distances: ...
-def placed_boxes(
+def bounding_boxes(
     poses: _F,
     rotations: _F,
     uncertainty: _F,

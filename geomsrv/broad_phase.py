@@ -77,7 +77,7 @@ class Candidates:
 def boxes_now(world: World) -> Aabbs:
     """Boxes around every object where it is now, grown by its uncertainty."""
     table, rows = world.table, world.shape
-    lower, upper = _core.placed_boxes(
+    lower, upper = _core.bounding_boxes(
         world.poses,
         world.rotations,
         world.uncertainty,

@@ -61,22 +61,23 @@ struct BoxRows {
 };
 
 /// Of objects that have row `shape` of a table of bounds.
-nb::tuple placed_boxes(const Rows7& poses, const Matrices3& rotations, const Values& uncertainty,
-                       const Offsets& shape, const Rows3& center, const Rows3& half, const Values& round,
-                       double rounding, double underflow) {
+nb::tuple bounding_boxes(const Rows7& poses, const Matrices3& rotations, const Values& uncertainty,
+                         const Offsets& shape, const Rows3& center, const Rows3& half, const Values& round,
+                         double rounding, double underflow) {
     const std::size_t count = poses.shape(0);
     if (rotations.shape(0) != count || uncertainty.shape(0) != count || shape.shape(0) != count) {
-        throw std::invalid_argument("placed_boxes: one row of each for an object");
+        throw std::invalid_argument("bounding_boxes: one row of each for an object");
     }
     const BoxRows out(count);
-    const nb::gil_scoped_release unlocked;
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto row = static_cast<std::size_t>(shape.data()[i]);
-        const ShapeBounds bounds{center.data() + 3 * row, half.data() + 3 * row, round.data()[row]};
-        out.put(i, placed_box(bounds, rotations.data() + 9 * i, poses.data() + 7 * i, uncertainty.data()[i],
-                              rounding, underflow));
+    {
+        const nb::gil_scoped_release unlocked;
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto row = static_cast<std::size_t>(shape.data()[i]);
+            const ShapeBounds bounds{center.data() + 3 * row, half.data() + 3 * row, round.data()[row]};
+            out.put(i, placed_box(bounds, rotations.data() + 9 * i, poses.data() + 7 * i,
+                                  uncertainty.data()[i], rounding, underflow));
+        }
     }
-    const nb::gil_scoped_acquire locked;
     return out.pair();
 }
 
@@ -89,23 +90,24 @@ nb::tuple swept_boxes(const Rows3& lower, const Rows3& upper, const Rows7& poses
         if (size != count) throw std::invalid_argument("swept_boxes: one row of each for an object");
     }
     const BoxRows out(count);
-    const nb::gil_scoped_release unlocked;
-    for (std::size_t i = 0; i < count; ++i) {
-        Aabb box;
-        std::copy_n(lower.data() + 3 * i, 3, box.lower);
-        std::copy_n(upper.data() + 3 * i, 3, box.upper);
-        const Sweep sweep{poses.data() + 7 * i, twists.data() + 6 * i, turns.data()[i], reach.data()[i],
-                          drift.data()[i]};
-        out.put(i, swept_box(box, sweep, horizon, rounding));
+    {
+        const nb::gil_scoped_release unlocked;
+        for (std::size_t i = 0; i < count; ++i) {
+            Aabb box;
+            std::copy_n(lower.data() + 3 * i, 3, box.lower);
+            std::copy_n(upper.data() + 3 * i, 3, box.upper);
+            const Sweep sweep{poses.data() + 7 * i, twists.data() + 6 * i, turns.data()[i], reach.data()[i],
+                              drift.data()[i]};
+            out.put(i, swept_box(box, sweep, horizon, rounding));
+        }
     }
-    const nb::gil_scoped_acquire locked;
     return out.pair();
 }
 
 }  // namespace
 
 void define_broad_phase(nb::module_& m) {
-    m.def("placed_boxes", placed_boxes, nb::arg("poses").noconvert(), nb::arg("rotations").noconvert(),
+    m.def("bounding_boxes", bounding_boxes, nb::arg("poses").noconvert(), nb::arg("rotations").noconvert(),
           nb::arg("uncertainty").noconvert(), nb::arg("shape").noconvert(), nb::arg("center").noconvert(),
           nb::arg("half").noconvert(), nb::arg("round").noconvert(), nb::arg("rounding"),
           nb::arg("underflow"));

@@ -54,7 +54,7 @@ struct Sweep {
     double drift;  ///< by how much its velocity may be off
 };
 
-/// Around all that an object in `now` passes through within `horizon` > 0.
+/// Around all that an object in `now` passes through within `horizon` >= 0; at 0 that is however it turns.
 inline Aabb swept_box(Aabb now, const Sweep& sweep, double horizon, double rounding) {
     const double drift = sweep.drift > 0.0 ? sweep.drift * horizon : 0.0;
     for (int k = 0; k < 3; ++k) {
