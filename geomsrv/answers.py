@@ -8,7 +8,7 @@ Only values live here.  Row i of every array belongs to item i of the batch; NaN
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -30,6 +30,8 @@ __all__ = [
     "Distances",
     "FirstContacts",
     "FrustumRegion",
+    "end_to_end",
+    "sets_end_to_end",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -325,6 +327,19 @@ class FirstContacts(_Certified):
         float64, on first use.
         """
         return self._closing_speed() if callable(self._closing_speed) else self._closing_speed
+
+
+def end_to_end(items: Sequence[FloatArray], width: int) -> tuple[FloatArray, IntArray]:
+    """Rows of all items, and where each begins and ends."""
+    offsets = np.cumsum([0, *map(len, items)], dtype=np.int64)
+    return np.concatenate([np.zeros((0, width)), *items]), offsets
+
+
+def sets_end_to_end(sets: Iterable[Sequence[FloatArray]], width: int) -> tuple[FloatArray, IntArray, IntArray]:
+    """Contact sets, each a list of parts (m, d): ``points``, ``point_offsets`` and ``part_offsets`` of an answer."""
+    listed = list(sets)
+    points, ends = end_to_end([part for parts in listed for part in parts], width)
+    return points, ends[np.cumsum([0, *map(len, listed)])], ends
 
 
 @dataclass(frozen=True, eq=False)

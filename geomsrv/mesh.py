@@ -7,20 +7,20 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _validate
-from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray, IntArray
+from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray, IntArray, sets_end_to_end
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.mesh_contact import common_plane, united_in_space
 from geomsrv.mesh_tree import Sweep, Tree, in_order
 from geomsrv.shapes import Boxes, Convex, Mesh, Polytopes
-from geomsrv.turning import middles, turns
+from geomsrv.turning import approach, middles, turns
 from geomsrv.verify import Pair, clip_of, relative_velocity, way_of
 
 __all__ = ["first_contact_meshes"]
@@ -69,18 +69,10 @@ def first_contact_meshes(
         ways = moving[0][i], moving[1][i]
         if turning:
             options |= {name: values[i] for name, values in about.items()}
-        rows.append((_first_turning if turning else _first)(ask, bodies, i, ways, end, options, counts))
-    sets = [row.parts if wanted else [] for row in rows]
-    points = [part for parts in sets for part in parts]
-    ends = np.cumsum([0, *map(len, points)], dtype=np.int64)
+        rows.append((_first_turning if turning else _first)(_Question(ask, bodies, i, ways, end, options, counts)))
+    points, point_offsets, part_offsets = sets_end_to_end((row.parts if wanted else [] for row in rows), 3)
     numbers = np.array([row.numbers for row in rows]).reshape(-1, 4)
     normal = np.array([row.normal for row in rows]).reshape(-1, 3)
-
-    def speed() -> FloatArray:
-        with np.errstate(over="ignore", invalid="ignore"):
-            x, y, z = ((moving[0] - moving[1]) * normal).T
-        closing: FloatArray = x + y + z  # in this order everywhere
-        return closing
 
     middle, lower, upper, last = (np.ascontiguousarray(column) for column in numbers.T)
     return FirstContacts(
@@ -90,12 +82,14 @@ def first_contact_meshes(
         time_upper=upper,
         last_time=last,
         normal=normal,
-        points=np.concatenate([np.zeros((0, 3)), *points]),
-        point_offsets=ends[np.cumsum([0, *map(len, sets)])],
+        points=points,
+        point_offsets=point_offsets,
         certain=np.array([row.certain for row in rows], np.bool_),
-        _closing_speed=np.array([row.closing_speed for row in rows]) if turning else speed,
+        _closing_speed=(
+            np.array([row.closing_speed for row in rows]) if turning else lambda: approach(moving[0], moving[1], normal)
+        ),
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
-        _part_offsets=ends,
+        _part_offsets=part_offsets,
     )
 
 
@@ -187,31 +181,42 @@ class _Found:
         raise IndexError(row)
 
 
-def _first(
-    ask: Ask,
-    bodies: list[_Pieces],
-    i: int,
-    ways: tuple[FloatArray, FloatArray],
-    end: float,
-    options: dict[str, Any],
-    counts: Counter[str],
-) -> _Row:
+class _Question(NamedTuple):
+    """What is asked about one item."""
+
+    ask: Ask
+    bodies: list[_Pieces]
+    item: int
+    ways: tuple[FloatArray, FloatArray]  #: velocities
+    end: float  #: of the time window
+    options: dict[str, Any]  #: of `ask`
+    counts: Counter[str]  #: of all items
+
+    def batches(self, pieces: Iterable[IntArray]) -> Iterator[Boxes | Polytopes]:
+        """Listed pieces of a, and of b."""
+        return (body.batch(self.item, p) for body, p in zip(self.bodies, pieces, strict=True))
+
+    def trees(self) -> tuple[Tree, Tree]:
+        """Boxes around the pieces of a, and of b."""
+        a, b = (body.tree(self.item) for body in self.bodies)
+        return a, b
+
+
+def _first(q: _Question) -> _Row:
     found, row = _Found(), _Row()
-    bound, last = end, -np.inf
+    bound, last = q.end, -np.inf
 
     def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
         nonlocal bound, last
-        answer = ask(
-            *(body.batch(i, p) for body, p in zip(bodies, (pieces_a, pieces_b), strict=True)), *ways, **options
-        )
-        counts.update(answer.cost.counts)
-        counts["pairs of pieces"] += len(pieces_a)
+        answer = q.ask(*q.batches((pieces_a, pieces_b)), *q.ways, **q.options)
+        q.counts.update(answer.cost.counts)
+        q.counts["pairs of pieces"] += len(pieces_a)
         found.answers.append(answer)
         found.pieces.append((pieces_a, pieces_b))
         bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
         last = float(np.fmax.reduce(answer.last_time, initial=last))
 
-    sweep = Sweep.of(bodies[0].tree(i), bodies[1].tree(i), *ways)
+    sweep = Sweep.of(*q.trees(), *q.ways)
     in_order(sweep.a, sweep.b, sweep.first, lambda: sweep.not_after(bound), look)
     if not found.answers:
         return row
@@ -224,21 +229,23 @@ def _first(
     high = float(np.fmin.reduce(upper))
     tied = np.flatnonzero(lower <= high)
     answers = len(found.answers)
-    if last < end:
-        in_order(sweep.a, sweep.b, sweep.last, lambda: sweep.after(last) if last < end else -np.inf, look)
+    if last < q.end:
+        in_order(sweep.a, sweep.b, sweep.last, lambda: sweep.after(last) if last < q.end else -np.inf, look)
     del found.answers[answers:]  # none of them is earlier
     deep = status == ContactStatus.OVERLAPPING
     row.status = int(status[tied].max())
     row.numbers = (float(np.fmin.reduce(middle)), float(np.fmin.reduce(lower)), high, last)
     overlapping = row.status == ContactStatus.OVERLAPPING
     row.certain |= bool((deep & sure).any())
-    if options["accuracy"] == "bound":
+    if q.options["accuracy"] == "bound":
         return row
-    if options["accuracy"] == "exact" and len(tied) > 1 and (lower[tied] < upper[tied]).any():
-        tied = tied[_exactly_first(ask, bodies, i, ways, options, found.listed(tied))]
+    if q.options["accuracy"] == "exact" and len(tied) > 1 and (lower[tied] < upper[tied]).any():
+        tied = tied[_exactly_first(q, found.listed(tied))]
     sets = [found.set_of(k) for k in tied.tolist()]
     moved = [
-        tuple(body.corners(i, p) + row.numbers[0] * way for body, p, way in zip(bodies, pair, ways, strict=True))
+        tuple(
+            body.corners(q.item, p) + row.numbers[0] * way for body, p, way in zip(q.bodies, pair, q.ways, strict=True)
+        )
         for pair in zip(*(pieces.tolist() for pieces in found.listed(tied)), strict=True)
     ]
     # In a power of two near the size, so that no product overflows or vanishes.
@@ -246,57 +253,46 @@ def _first(
     unit = math.frexp(size)[1] if math.isfinite(size) else 0
     sets = [np.ldexp(part, -unit) for part in sets]
     spread = float(middle[tied].max() - row.numbers[0])
-    slack = PLACE_ROUNDING + math.ldexp(max(float(np.abs(way).max()) for way in ways) * spread, -unit)
+    slack = PLACE_ROUNDING + math.ldexp(max(float(np.abs(way).max()) for way in q.ways) * spread, -unit)
     if not overlapping:
         near = [(np.ldexp(a, -unit), np.ldexp(b, -unit)) for a, b in moved]
-        velocity = 0.5 * ways[0] - 0.5 * ways[1]
+        velocity = 0.5 * q.ways[0] - 0.5 * q.ways[1]
         row.normal = common_plane(
             near, np.array([part[0] for part in sets]), found.column("normal")[tied], velocity, slack
         )
     row.parts = [np.ldexp(part, unit) for part in united_in_space(sets, slack, row.normal)]
-    if not overlapping:
-        if row.status == ContactStatus.TOUCHING and len(tied) > 1 and np.isnan(row.normal[0]):
-            row.certain = False  # none may pass through the other, and both together do
+    if row.status == ContactStatus.TOUCHING and len(tied) > 1 and np.isnan(row.normal[0]):
+        row.certain = False  # none may pass through the other, and both together do
     return row
 
 
-def _first_turning(
-    ask: Ask,
-    bodies: list[_Pieces],
-    i: int,
-    ways: tuple[FloatArray, FloatArray],
-    end: float,
-    options: dict[str, Any],
-    counts: Counter[str],
-) -> _Row:
+def _first_turning(q: _Question) -> _Row:
     """The same for bodies that turn: boxes around pieces turn with them."""
     found, row = _Found(), _Row()
-    bound = end
-    trees = [body.tree(i) for body in bodies]
+    bound = q.end
+    trees = q.trees()
 
-    def followed(sides: tuple[Boxes | Polytopes, Boxes | Polytopes], contact_set: bool) -> FirstContacts:
+    def followed(sides: Iterable[Boxes | Polytopes], contact_set: bool) -> FirstContacts:
         # What meets later than a proven contact need not be followed.
-        answer = ask(*sides, *ways, **{**options, "t_max": bound, "contact_set": contact_set})
-        counts.update(answer.cost.counts)
+        answer = q.ask(*sides, *q.ways, **{**q.options, "t_max": bound, "contact_set": contact_set})
+        q.counts.update(answer.cost.counts)
         return answer
 
     def begin(nodes_a: IntArray, nodes_b: IntArray) -> FloatArray:
         if not len(nodes_a):
             return np.zeros(0)
-        one, two = (
-            body.nodes(i, tree, rows) for body, tree, rows in zip(bodies, trees, (nodes_a, nodes_b), strict=True)
-        )
-        answer = followed((one, two), False)
+        sides = zip(q.bodies, trees, (nodes_a, nodes_b), strict=True)
+        answer = followed((body.nodes(q.item, tree, rows) for body, tree, rows in sides), False)
         return np.where(answer.status == ContactStatus.NEVER, np.inf, answer.time_lower)
 
     def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
         nonlocal bound
-        answer = followed((bodies[0].batch(i, pieces_a), bodies[1].batch(i, pieces_b)), True)
-        counts["pairs of pieces"] += len(pieces_a)
+        answer = followed(q.batches((pieces_a, pieces_b)), True)
+        q.counts["pairs of pieces"] += len(pieces_a)
         found.answers.append(answer)
         bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
 
-    in_order(trees[0], trees[1], begin, lambda: bound, look, TURNING_BATCH)
+    in_order(*trees, begin, lambda: bound, look, TURNING_BATCH)
     if not found.answers:
         return row
     status, lower = found.column("status"), found.column("time_lower")
@@ -307,7 +303,7 @@ def _first_turning(
     low, high = float(lower[first]), float(np.fmin.reduce(found.column("time_upper")))
     row.numbers = (low, low, high, np.nan)
     row.status = int(status[first])
-    if row.status == ContactStatus.GRAZING and high - low <= options["tolerance"]:
+    if row.status == ContactStatus.GRAZING and high - low <= q.options["tolerance"]:
         row.status = ContactStatus.WILL_TOUCH
     for at_once in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING):
         row.status = at_once if (status == at_once).any() else row.status
@@ -319,19 +315,12 @@ def _first_turning(
     return row
 
 
-def _exactly_first(
-    ask: Ask,
-    bodies: list[_Pieces],
-    i: int,
-    ways: tuple[FloatArray, FloatArray],
-    options: dict[str, Any],
-    pieces: tuple[IntArray, IntArray],
-) -> IntArray:
+def _exactly_first(q: _Question, pieces: tuple[IntArray, IntArray]) -> IntArray:
     """Of pairs whose times round to neighbours those that are first: as their proofs tell, in rational numbers."""
-    sides = (body.batch(i, p) for body, p in zip(bodies, pieces, strict=True))
-    answer = ask(*sides, *ways, **{**options, "certificates": True})
+    answer = q.ask(*q.batches(pieces), *q.ways, **{**q.options, "certificates": True})
     times = [_time_of(record) for record in answer.certificates or ()]
-    return np.flatnonzero([time == min(times) for time in times])
+    first = min(times)
+    return np.flatnonzero([time == first for time in times])
 
 
 def _time_of(record: dict[str, Any]) -> Fraction:

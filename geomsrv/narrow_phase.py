@@ -20,7 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _core
-from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus, FloatArray, IntArray
+from geomsrv.answers import (
+    BoolArray,
+    ByteArray,
+    ContactStatus,
+    DistanceStatus,
+    FloatArray,
+    IntArray,
+    sets_end_to_end,
+)
 from geomsrv.queries import RUNGS, SOLID_MOTION_TIERS
 from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
 
@@ -29,10 +37,10 @@ __all__ = [
     "DistanceRows",
     "at_rest",
     "distance_rows",
-    "end_to_end",
     "first_contact_rows",
     "followed_solids",
     "near_at_rest",
+    "packed_sets",
     "placed",
     "placed_boxes",
     "placed_distances",
@@ -408,12 +416,9 @@ def _sets(points: FloatArray, offsets: IntArray) -> NDArray[np.object_]:
     return sets
 
 
-def end_to_end(sets: Iterable[Any]) -> tuple[FloatArray, IntArray, IntArray]:
+def packed_sets(sets: Iterable[Any]) -> tuple[FloatArray, IntArray, IntArray]:
     """Contact sets as those of `ContactRows`: all points, where those of each row begin, and where its parts do."""
-    listed = [[] if parts is None else parts if isinstance(parts, list) else [parts] for parts in sets]
-    flat = [part for parts in listed for part in parts]
-    ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
-    return np.concatenate([np.zeros((0, 3)), *flat]), ends[np.cumsum([0, *map(len, listed)])], ends
+    return sets_end_to_end(([] if x is None else x if isinstance(x, list) else [x] for x in sets), 3)
 
 
 _Side = tuple[Any, ...]

@@ -23,7 +23,7 @@ from geomsrv.narrow_phase import (
     DistanceRows,
     Unsupported,
     count_kinds,
-    end_to_end,
+    packed_sets,
     placed_distances,
     polygon_contacts,
     polygon_distances,
@@ -326,7 +326,7 @@ def listed_first_contacts(
         ContactStatus.UNSUPPORTED
     )
     sets = [*rows.points, None]
-    points, point_offsets, part_offsets = end_to_end(sets[k] for k in at.tolist())
+    points, point_offsets, part_offsets = packed_sets(sets[k] for k in at.tolist())
     normal = _take(rows.normal, at, np.nan)
     return ListedContacts(
         status=status,
@@ -360,7 +360,7 @@ def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, 
     counts = Counter[str]()
     _count(world, pairs, counts)
     rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon, tier, counts)
-    points, point_offsets, part_offsets = end_to_end(rows.points)
+    points, point_offsets, part_offsets = packed_sets(rows.points)
     return ListedContacts(
         status=rows.status,
         time=rows.time,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _validate
-from geomsrv.answers import Booleans, ContactStatus, Cost, Distances, FirstContacts
+from geomsrv.answers import Booleans, ContactStatus, Cost, Distances, FirstContacts, sets_end_to_end
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.region_contact import (
     Moving,
@@ -136,10 +136,8 @@ def first_contact_regions(
     outcome, low, high = status[first, every], lower[first, every], np.fmin.reduce(upper, axis=0)
     outcome[(outcome == ContactStatus.GRAZING) & (high - low <= options["tolerance"])] = ContactStatus.WILL_TOUCH
     overlap = status == ContactStatus.OVERLAPPING
-    for at_once in (
-        ContactStatus.TOUCHING,
-        ContactStatus.OVERLAPPING,
-    ):  # even if others do so too soon to be told apart
+    # Even if others do so too soon to be told apart.
+    for at_once in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING):
         outcome[(status == at_once).any(axis=0)] = at_once
     normal = np.array([answer.normal for answer in found])[first, every]
     sure = certain.all(axis=0) | (overlap & certain).any(axis=0)
@@ -158,9 +156,7 @@ def first_contact_regions(
             normal[i], sets[i] = np.nan, _shared(bodies, pieces, i)
         else:
             sets[i], normal[i] = _contact(bodies, pieces, i, (low[i], high[i]))
-    points = [part for parts in sets for part in parts] if wanted else []
-    ends = np.cumsum([0, *map(len, points)], dtype=np.int64)
-    items = np.cumsum([0, *map(len, sets)]) if wanted else np.zeros(count + 1, np.int64)
+    points, point_offsets, part_offsets = sets_end_to_end(sets if wanted else [[] for _ in every], 2)
     speeds = np.array([answer.closing_speed for answer in found])[first, every] if turning else _approach(ways, normal)
     return FirstContacts(
         status=outcome,
@@ -169,12 +165,12 @@ def first_contact_regions(
         time_upper=high,
         last_time=np.fmax.reduce(last, axis=0),
         normal=normal,
-        points=np.concatenate([np.zeros((0, 2)), *points]),
-        point_offsets=ends[items],
+        points=points,
+        point_offsets=point_offsets,
         certain=sure,
         _closing_speed=speeds,
         cost=_cost(found, start),
-        _part_offsets=ends,
+        _part_offsets=part_offsets,
     )
 
 

@@ -24,7 +24,7 @@ from geomsrv import _validate
 from geomsrv.answers import BoolArray, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
 from geomsrv.errors import GeometryError, SceneError
-from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, end_to_end
+from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, packed_sets
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
 from geomsrv.queries import TIERS
@@ -597,7 +597,7 @@ class Scene:
             rows.last_time,
             rows.normal,
             closing_speeds(world, rows),
-            *end_to_end(rows.points),
+            *packed_sets(rows.points),
         )
 
     def cull(self, frustum: Frustum, *, ids: Iterable[str] | None = None, accuracy: str = "float64") -> SceneCull:

@@ -15,7 +15,7 @@ from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import Boxes, Polygons, Polytopes
 
-__all__ = ["first_contact_turning", "middles", "turns"]
+__all__ = ["approach", "first_contact_turning", "middles", "turns", "velocity_at"]
 
 Bodies = Boxes | Polygons | Polytopes
 
@@ -101,13 +101,26 @@ def _closing_speed(
     moment: FloatArray, normal: FloatArray, point: FloatArray, motion_a: FloatArray, motion_b: FloatArray
 ) -> FloatArray:
     """(n,) speed at which the bodies approach at their contact point; NaN without one."""
+    velocity_a, velocity_b = (
+        velocity_at(motion[:, :3], motion[:, 3:6], motion[:, 6:], moment[:, None], point)
+        for motion in (motion_a, motion_b)
+    )
+    return approach(velocity_a, velocity_b, normal)
 
-    def velocity(motion: FloatArray) -> FloatArray:
-        linear, angular, center = motion[:, :3], motion[:, 3:6], motion[:, 6:]
-        return linear + np.cross(angular, point - (center + moment[:, None] * linear))
 
+def velocity_at(
+    linear: FloatArray, angular: FloatArray, center: FloatArray, moment: Any, points: FloatArray
+) -> FloatArray:
+    """(m, 3) of a body at a moment, where it holds the given points; its centre is that at the start."""
     with np.errstate(over="ignore", invalid="ignore"):
-        x, y, z = ((velocity(motion_a) - velocity(motion_b)) * normal).T
+        velocity: FloatArray = linear + np.cross(angular, points - (center + moment * linear))
+    return velocity
+
+
+def approach(velocity_a: FloatArray, velocity_b: FloatArray, normal: FloatArray) -> FloatArray:
+    """(n,) speed at which a comes nearer to b along the normal (n, 3)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        x, y, z = ((velocity_a - velocity_b) * normal).T
         speed: FloatArray = x + y + z  # in this order everywhere
     return speed
 

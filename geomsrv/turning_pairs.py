@@ -30,6 +30,7 @@ from geomsrv.narrow_phase import (
     placed_boxes,
     placed_hulls,
 )
+from geomsrv.turning import approach, velocity_at
 from geomsrv.world import ROUNDOFF, World, gather
 
 __all__ = ["closing_speeds", "contact_rows", "first_contact_row", "followed_in_turning", "nearness"]
@@ -82,12 +83,9 @@ def first_contact_row(
     Pairs are taken in the order in which their boxes meet, until what is left meets later than contact is proven.
     """
     begin = entry_times(world, pairs, margin)
-    order, found, first = (
-        np.argsort(begin, kind="stable"),
-        [(ContactRows.silent(pairs[:0]), Unsupported.none())],
-        np.inf,
-    )
-    done, size = 0, FEW
+    order = np.argsort(begin, kind="stable")
+    found = [(ContactRows.silent(pairs[:0]), Unsupported.none())]
+    first, done, size = np.inf, 0, FEW
     while done < len(order) and begin[order[done]] <= first + TIME_TOLERANCE:
         chosen = np.sort(order[done : done + size])
         found.append(contact_rows(world, pairs[chosen], horizon, tier, counts, margin))
@@ -142,24 +140,18 @@ def closing_speeds(world: World, rows: ContactRows) -> FloatArray:
     matters, and where it is not known how an object moves.
     """
     a, b = rows.pairs.T
-    with np.errstate(over="ignore", invalid="ignore"):
-        x, y, z = ((world.twists[a, :3] - world.twists[b, :3]) * rows.normal).T
-        speed: FloatArray = x + y + z  # in this order everywhere
+    speed = approach(world.twists[a, :3], world.twists[b, :3], rows.normal)
     for k in np.flatnonzero(world.turns[rows.pairs].any(axis=1)).tolist():
         known = rows.points[k] is not None and not world.motion_faults.keys() & {int(a[k]), int(b[k])}
         speed[k] = np.nan
         if known:
             points = np.vstack(rows.points[k])  # of all parts
-            at = [_velocity(world, int(row), float(rows.time[k]), points) for row in (a[k], b[k])]
+            at = [
+                velocity_at(world.twists[row, :3], world.twists[row, 3:], world.poses[row, :3], rows.time[k], points)
+                for row in (a[k], b[k])
+            ]
             speed[k] = ((at[0] - at[1]) @ rows.normal[k]).max()
     return speed
-
-
-def _velocity(world: World, row: int, time: float, points: FloatArray) -> FloatArray:
-    """(m, 3) of an object where it holds the given points."""
-    linear, angular = world.twists[row, :3], world.twists[row, 3:]
-    velocity: FloatArray = linear + np.cross(angular, points - (world.poses[row, :3] + time * linear))
-    return velocity
 
 
 def _rolling(world: World, pairs: IntArray) -> BoolArray:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geomsrv import _core, _validate
-from geomsrv.answers import BoolArray, ByteArray, FloatArray, IntArray
+from geomsrv.answers import BoolArray, ByteArray, FloatArray, IntArray, end_to_end
 from geomsrv.shapes import (
     Box,
     Capsule,
@@ -112,8 +112,8 @@ class ShapeTable:
         names = sorted({shape.kind for shape in listed})
         codes = {name: code for code, name in enumerate(names)}
         kind = np.array([codes[shape.kind] for shape in listed], dtype=np.int64)
-        hulls, hull_offsets = _end_to_end([row.hull for row in rows], 3)
-        rings, ring_offsets = _end_to_end([row.ring for row in rows], 2)
+        hulls, hull_offsets = end_to_end([row.hull for row in rows], 3)
+        rings, ring_offsets = end_to_end([row.ring for row in rows], 2)
         return cls(
             shapes=listed,
             rows=rows,
@@ -143,12 +143,6 @@ def own_numbers(shapes: Sequence[AnyShape]) -> FloatArray | None:
     if not any(isinstance(shape, Frustum) for shape in shapes):
         return None
     return np.array([shape.packed() if isinstance(shape, Frustum) else np.zeros(18) for shape in shapes])
-
-
-def _end_to_end(items: list[FloatArray], width: int) -> tuple[FloatArray, IntArray]:
-    """Rows of all items, and where each begins and ends."""
-    offsets = np.cumsum([0, *map(len, items)], dtype=np.int64)
-    return np.concatenate([np.zeros((0, width)), *items]), offsets
 
 
 def _bounds(shape: AnyShape) -> tuple[float, ...]:
