@@ -175,6 +175,11 @@ def rows(value: Any, name: str, count: int, width: int) -> NDArray[np.float64]:
     return found
 
 
+def velocities(value: Any, count: int, width: int) -> NDArray[np.float64]:
+    """Of obstacles, (n, d) or (1, d); they rest by default."""
+    return np.zeros((1, width)) if value is None else rows(value, "velocities", count, width)
+
+
 def common_length(a: int, b: int) -> int:
     """Number of items of two batches, n against n or one against n."""
     if a != b and 1 not in (a, b):

@@ -202,11 +202,7 @@ def _turning_contact(case: Case, accuracy: str, truth: Truth) -> Iterator[Findin
     if motion.status == ContactStatus.NEVER or status == ContactStatus.NEVER:
         return
     assert motion.time is not None
-    # Apart until `low`, in contact by `high`: this is told of every outcome, and has to hold.
-    latest = motion.time_upper
-    holds = low <= high and (latest is None or Fraction(low) <= latest)
-    holds = holds and (high == math.inf or motion.time <= Fraction(high))
-    yield _boolean(holds, True, False, f"time in [{low!r}, {high!r}], should be {float(motion.time)!r}")
+    yield _enclosed(low, high, motion.time, motion.time_upper)
 
 
 def _time_of_impact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding]:
@@ -227,8 +223,13 @@ def _time_of_impact(case: Case, accuracy: str, truth: Truth) -> Iterator[Finding
         return
     low, high = float(answer.time_lower[0]), float(answer.time_upper[0])
     slack = TIME_VERIFIED * expected.time_scale
-    right = Fraction(low) <= expected.time + slack and (high == math.inf or expected.time - slack <= Fraction(high))
-    yield _boolean(right, True, False, f"time in [{low!r}, {high!r}], should be {float(expected.time)!r}")
+    yield _enclosed(low, high, expected.time - slack, expected.time + slack)
+
+
+def _enclosed(low: float, high: float, begun: Fraction, by: Fraction | None) -> Finding:
+    """Apart until `low`, in contact by `high`, against what is between `begun` and `by`, None: or never."""
+    holds = low <= high and (by is None or Fraction(low) <= by) and (high == math.inf or begun <= Fraction(high))
+    return _boolean(holds, True, False, f"time in [{low!r}, {high!r}], should be {float(begun)!r}")
 
 
 def _contact_set(points: Any, motion: Motion, scale: Fraction) -> Finding:

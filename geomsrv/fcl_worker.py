@@ -105,7 +105,10 @@ class Peer:
         raise NotImplementedError
 
     def follow(self, a: int, b: int, pose: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[int, float]:
-        """Outcome and share of the way at first contact of one pair, b moving by `step` in the frame of a."""
+        """Outcome and share of the way at first contact of one pair, b moving by `step` in the frame of a.
+
+        Of FCL only: Coal has no continuous collision.
+        """
         raise NotImplementedError
 
 

@@ -78,11 +78,11 @@ def time_to_collision(
     step = _validate.scalar(tolerance, "tolerance", positive=True)
     points = None
     if isinstance(obstacles, Polygons):
-        rest = _speeds(velocities, len(obstacles))
+        rest = _validate.velocities(velocities, len(obstacles), 2)
         found = [_polygons(ring, motion, obstacles, rest, end, step) for ring in rings]
     else:
         points = _validate.floats(obstacles, "obstacles", (None, 2))
-        rest = _speeds(velocities, len(points))
+        rest = _validate.velocities(velocities, len(points), 2)
         found = [_core.points_on_twist(ring, motion, points, rest, end, step) for ring in rings]
     status, lower, upper = found[0][:3]
     closed = min(piece[3] for piece in found)
@@ -158,8 +158,3 @@ def _ring(footprint: ArrayLike | Polygon) -> FloatArray:
         return Polygons(points, [0, len(points)]).vertices
     except GeometryError as error:
         raise GeometryError(str(error).replace("vertices: ring 0", "footprint")) from None
-
-
-def _speeds(velocities: ArrayLike | None, count: int) -> FloatArray:
-    """(n, 2) or (1, 2)."""
-    return np.zeros((1, 2)) if velocities is None else _validate.rows(velocities, "velocities", count, 2)

@@ -167,14 +167,8 @@ def _ask(fcl: FclSupervisor, world: World, pairs: IntArray, horizon: float) -> t
     """FCL's outcomes, and the shares of the way at which it sees contact begin."""
     solids = [Solid.of(shape, number) for number, shape in enumerate(world.table.shapes)]
     a, b = pairs.T
-    turn = world.rotations[a]
-
-    def local(vectors: FloatArray) -> FloatArray:
-        turned: FloatArray = np.einsum("nji,nj->ni", turn, vectors)
-        return turned
-
-    poses = relative_poses(world, pairs)
-    steps = local(horizon * (world.twists[b, :3] - world.twists[a, :3]))
+    poses, ways = relative_poses(world, pairs), horizon * (world.twists[b, :3] - world.twists[a, :3])
+    steps = np.einsum("nji,nj->ni", world.rotations[a], ways)
     asked = [(solids[world.shape[i]], solids[world.shape[j]]) for i, j in pairs.tolist()]
     replies = fcl.ask(asked, poses, steps)
     return replies["outcome"], replies["distance"]
@@ -203,8 +197,8 @@ def _stands(world: World, pair: IntArray, horizon: float, time: float) -> bool |
 
 def _bounds(world: World, pair: IntArray, t: float) -> tuple[float, float]:
     """Proven bounds of the signed distance at a time."""
-    poses = world.poses.copy()
-    poses[pair, :3] += t * world.twists[pair, :3]
-    there = world.moved(np.arange(len(world)), poses, None, world.version, None)
+    poses = world.poses[pair]
+    poses[:, :3] += t * world.twists[pair, :3]
+    there = world.moved(pair, poses, None, world.version, None)
     answer = listed_distances(there, pair[None], want=("penetration",))
     return float(answer.lower[0]), float(answer.upper[0])

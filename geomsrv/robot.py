@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from geomsrv.errors import GeometryError
 from geomsrv.scene import SceneObject
-from geomsrv.shapes import Box, Convex, Cylinder, Mesh, Shape, Sphere
+from geomsrv.shapes import Box, Convex, Cylinder, Mesh, Shape, Sphere, vertices_of
 
 __all__ = ["Robot", "example_robot_directory"]
 
@@ -141,7 +141,7 @@ class Robot:
             angular, at_origin = twists[c.link]
             if isinstance(shape, Box | Convex) and angular.any():
                 on_axis = _nearest_on_axis(angular, at_origin, place[:3, 3])
-                shape = Convex(_vertices(shape) + (place[:3, 3] - on_axis) @ place[:3, :3])
+                shape = Convex(vertices_of(shape) + (place[:3, 3] - on_axis) @ place[:3, :3])
                 place[:3, 3] = on_axis
             linear = at_origin + np.cross(angular, place[:3, 3])
             objects.append(SceneObject(c.id, shape, _pose(place), (*linear, *angular), frame))
@@ -215,12 +215,6 @@ def example_robot_directory() -> Path:
             "example robots need the package example-robot-data: pip install example-robot-data"
         ) from None
     return Path(str(distribution.locate_file("cmeel.prefix/share/example-robot-data")))
-
-
-def _vertices(shape: Box | Convex) -> NDArray[np.float64]:
-    if isinstance(shape, Convex):
-        return shape.vertices
-    return np.array(list(product((-1.0, 1.0), repeat=3))) * shape.half_extents
 
 
 def _nearest_on_axis(

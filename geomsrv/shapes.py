@@ -634,6 +634,11 @@ class Convex(Shape):
         freeze(self, vertices=points)
 
 
+def vertices_of(shape: Box | Convex) -> FloatArray:
+    """(m, 3) float64: vertices of a solid that is the hull of them, in its own frame."""
+    return CORNER_SIGNS * shape.half_extents if isinstance(shape, Box) else shape.vertices
+
+
 @dataclass(frozen=True, init=False, eq=False)
 class Mesh(Shape):
     """Triangle mesh: `vertices` (m, 3) [m] and `triangles` (k, 3) vertex indices.

@@ -14,7 +14,6 @@ what is proven of the pieces is true of the motion.  Where a piece strays too fa
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,8 +23,8 @@ from numpy.typing import ArrayLike
 from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray
 from geomsrv.errors import GeometryError
-from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze
-from geomsrv.world import ROUNDOFF
+from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze, vertices_of
+from geomsrv.world import ROUNDOFF, gather
 
 __all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
 
@@ -302,19 +301,17 @@ def first_contact_along(
     if not isinstance(obstacles, kinds):
         names = " or ".join(kind.__name__ for kind in kinds)
         raise GeometryError(f"obstacles must be {names} for such a motion, got {type(obstacles).__name__}")
-    dimension, count = (2 if motion.planar else 3), len(obstacles)
-    drift = _speeds(velocities, count, dimension)
+    drift = _validate.velocities(velocities, len(obstacles), 2 if motion.planar else 3)
     search = _Search(vertices, motion, obstacles, drift, step)
     status, lower, upper = search.run()
     certain = (status < ContactStatus.UNSUPPORTED) & ((status != ContactStatus.TOUCHING) | (upper == motion.start))
-    counts = {"pieces": search.looked_at}
     return CollisionTimes(
         status=status,
         time=lower.copy(),
         time_lower=lower,
         time_upper=upper,
         certain=certain,
-        cost=Cost(time.perf_counter_ns() - begin, "float64", counts),
+        cost=Cost(time.perf_counter_ns() - begin, "float64", {"pieces": search.looked_at}),
     )
 
 
@@ -422,11 +419,8 @@ class _Search:
             motions[:, 6:] = center
             axes, half = self._obstacles.axes[rows], self._obstacles.half_extents[rows]
             return (center, np.ascontiguousarray(axes), np.ascontiguousarray(half)), motions
-        offsets = self._obstacles.offsets
-        counts = np.diff(offsets)[rows]
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        source = np.arange(ends[-1]) + np.repeat(offsets[rows] - ends[:-1], counts)
-        vertices = self._obstacles.vertices[source] + np.repeat(shift, counts, axis=0)
+        vertices, ends = gather(self._obstacles.vertices, self._obstacles.offsets, rows)
+        vertices = vertices + np.repeat(shift, np.diff(ends), axis=0)
         motions[:, 6 : 6 + vertices.shape[1]] = vertices[ends[:-1]]
         return (vertices, ends), motions
 
@@ -437,23 +431,9 @@ def _vertices(body: Polygon | Box | Convex, flat: bool) -> FloatArray:
         if not isinstance(body, Polygon):
             raise GeometryError(f"body must be Polygon for a motion in the plane, got {type(body).__name__}")
         return np.column_stack([body.vertices, np.zeros(len(body.vertices))])
-    if isinstance(body, Box):
-        return np.array(list(_corners())) * body.half_extents
-    if not isinstance(body, Convex):
+    if not isinstance(body, Box | Convex):
         raise GeometryError(f"body must be Box or Convex for a motion in space, got {type(body).__name__}")
-    return body.vertices
-
-
-def _corners() -> Iterator[tuple[float, float, float]]:
-    for number in range(8):
-        yield tuple(1.0 if number >> k & 1 else -1.0 for k in range(3))  # type: ignore[misc]
-
-
-def _speeds(velocities: ArrayLike | None, count: int, dimension: int) -> FloatArray:
-    """(n, d) or (1, d)."""
-    if velocities is None:
-        return np.zeros((1, dimension))
-    return _validate.rows(velocities, "velocities", count, dimension)
+    return vertices_of(body)
 
 
 def _about_z(angle: float) -> FloatArray:

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real robots as scene objects: where their links are, and where they go."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
 import geomsrv as gs
 from geomsrv._validate import rotation_matrices
 from geomsrv.robot import Robot, example_robot_directory
+from geomsrv.shapes import vertices_of
 
 JOINTS = {
     "panda_joint1": 0.1,
@@ -32,9 +31,7 @@ def panda():
 
 def points_of(item, t=0.0):
     """Vertices in the world after `t` seconds of its twist, as a scene moves it."""
-    shape = item.shape
-    corners = np.array(list(product((-1.0, 1.0), repeat=3)))
-    vertices = corners * shape.half_extents if isinstance(shape, gs.Box) else shape.vertices
+    vertices = vertices_of(item.shape)
     turn = rotation_matrices(np.asarray(item.pose, float)[None, 3:])[0]
     angular = np.asarray(item.twist[3:], float)
     angle, half = np.linalg.norm(angular) * t, np.zeros(4)
