@@ -19,6 +19,7 @@ from geomsrv.narrow_phase import relative_poses
 from geomsrv.queries import TIERS
 from geomsrv.ros import convert
 from geomsrv.ros.handlers import Handlers
+from geomsrv.turning_pairs import TIME_TOLERANCE
 from geomsrv.verify import verify_lines
 
 OK, BAD_REQUEST, UNSUPPORTED, NOT_AVAILABLE, NOT_ACTIVE, INTERNAL_ERROR = range(6)
@@ -199,7 +200,7 @@ def test_first_contact_at_a_distance(desk) -> None:
     pair = {"select": BY_IDS, "ids_a": ["left"], "ids_b": ["right"], "horizon": 5.0}
     got = desk.ask("FirstContact", **pair, margin=0.5)
     assert got.status == OK and got.item_status.tolist() == [1]
-    assert got.time_lower[0] <= 1.5 <= got.time_upper[0] and got.time_upper[0] - got.time_lower[0] <= 1e-6
+    assert got.time_lower[0] <= 1.5 <= got.time_upper[0] <= got.time_lower[0] + TIME_TOLERANCE
     near = desk.ask("FirstContact", **pair, margin=2.5)
     assert near.item_status.tolist() == [3] and near.time.tolist() == [0.0]
     for field, value, status in (("margin", -1.0, BAD_REQUEST), ("margin", math.nan, BAD_REQUEST)):

@@ -21,6 +21,10 @@ import geomsrv as gs
 from geomsrv.answers import ContactStatus
 from geomsrv.robot import Robot, example_robot_directory
 
+ASKED = 1e-9  # how narrow a time interval is asked for where meshes turn [s]
+DEFAULT = 1e-6  # and by default; a closing speed of about 1 m/s changes by less than ten times that in that time
+PLACED = 1e-12  # time that bodies of ten metres need for what they are placed wrong by, at half a metre a second [s]
+
 QUADS = [
     (0, 2, 3, 1),
     (4, 5, 7, 6),
@@ -432,7 +436,7 @@ def test_turning_meshes_meet_as_their_triangles_do(rng: np.random.Generator) -> 
         b = at(b, a.vertices.mean(axis=0) - b.vertices.mean(axis=0) + rng.normal(size=3) * (1 if k == 0 else 6))
         v = (b.vertices.mean(axis=0) - a.vertices.mean(axis=0)) * 0.5 + rng.normal(size=3)
         centers = {"center_a": rng.normal(size=3), "center_b": b.vertices[0]}
-        motion: dict[str, Any] = {"t_max": 4.0, "angular_velocity_a": rng.normal(size=3), "tolerance": 1e-9, **centers}
+        motion: dict[str, Any] = {"t_max": 4.0, "angular_velocity_a": rng.normal(size=3), "tolerance": ASKED, **centers}
         if k % 2:
             motion["angular_velocity_b"] = rng.normal(size=3) * 2
         whole = gs.first_contact(a, b, v, (0, 0, 0), **motion)
@@ -447,7 +451,7 @@ def test_turning_meshes_meet_as_their_triangles_do(rng: np.random.Generator) -> 
         if whole.status[0] != gs.NEVER:
             low, high = np.fmin.reduce(every.time_lower), np.fmin.reduce(every.time_upper)
             assert whole.time_lower[0] <= high and low <= whole.time_upper[0] and np.isnan(whole.last_time[0])
-            assert whole.time_upper[0] - whole.time_lower[0] <= 1e-9
+            assert whole.time_upper[0] - whole.time_lower[0] <= ASKED
             near = np.flatnonzero(every.time_lower <= high)
             assert any(np.allclose(whole.normal[0], every.normal[n], atol=1e-6, equal_nan=True) for n in near)
     assert seen[gs.NEVER] > 0 and seen[gs.WILL_TOUCH] > 4 and looked < 0.5 * pairs
@@ -461,7 +465,8 @@ def test_turning_meshes_meet_as_their_triangles_do(rng: np.random.Generator) -> 
             gs.first_contact(x, other, (0, 0, 0), (0, 0, 0), angular_velocity_a=(0, 0, 1))
             for x in (bar, solid if isinstance(other, gs.Boxes) else bar)
         )
-        assert abs(shell.time[0] - full.time[0]) < 1e-6 and abs(shell.closing_speed[0] - full.closing_speed[0]) < 1e-5
+        assert abs(shell.time[0] - full.time[0]) < DEFAULT
+        assert abs(shell.closing_speed[0] - full.closing_speed[0]) < 10 * DEFAULT
         assert shell.status[0] == gs.WILL_TOUCH and shell.certain[0] and len(shell.parts(0)) == 1
         assert shell.time[0] <= math.atan2(0.9, 1.6) - math.asin(0.1 / math.hypot(0.9, 1.6)) <= shell.time_upper[0]
     with pytest.raises(gs.NotAvailableError, match="accuracy='exact' is not available for bodies that turn"):
@@ -495,7 +500,7 @@ def test_scenes(rng: np.random.Generator, accuracy: str) -> None:
     rows = {frozenset(pair): k for k, pair in enumerate(zip(answer.ids_a, answer.ids_b, strict=True))}
     k = rows[frozenset(("frame", "table"))]
     assert answer.status[k] == gs.WILL_TOUCH and answer.cost.counts["narrow box-mesh"] == 2
-    assert answer.time_lower[k] <= 4.0 <= answer.time_upper[k] + 1e-12
+    assert answer.time_lower[k] <= 4.0 <= answer.time_upper[k] + PLACED
     ends = answer.part_offsets
     parts = [
         answer.points[i:j]
@@ -509,7 +514,7 @@ def test_scenes(rng: np.random.Generator, accuracy: str) -> None:
         assert answer.time[k] == 4 and answer.normal[k].tolist() == [0, 0, -sign] and answer.closing_speed[k] == 0.5
         assert sorted(len(part) for part in parts) == [4, 4] and answer.last_time[k] == 10
         both = rows[frozenset(("frame", "other"))]
-        assert answer.time[both] == pytest.approx(6.0, abs=1e-12) and answer.status[both] == gs.WILL_TOUCH
+        assert answer.time[both] == pytest.approx(6.0, abs=PLACED) and answer.status[both] == gs.WILL_TOUCH
         assert frozenset(("frame", "wedge")) in rows
     reasons = {frozenset((a, b)): reason for a, b, reason in answer.unsupported}
     assert frozenset(("spinning", "table")) in reasons and frozenset(("ball", "frame")) in reasons

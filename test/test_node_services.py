@@ -16,6 +16,7 @@ import geomsrv as gs
 from geomsrv import msg, srv
 from geomsrv.ros import convert
 from geomsrv.ros.node import SERVICES
+from geomsrv.turning_pairs import TIME_TOLERANCE
 
 MILLION = 1_000_000
 SQUARE = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -86,7 +87,9 @@ def test_first_contact(client) -> None:
     assert list(got.closing_speed) == [1.0]
     request = srv.FirstContact.Request(select=request.select, horizon=5.0, margin=0.25, earliest=True)
     got = client.call(srv.FirstContact, "first_contact", request)
-    assert got.status == got.OK and list(got.item_status) == [got.WILL_TOUCH] and abs(got.time[0] - 1.75) <= 1e-6
+    assert (
+        got.status == got.OK and list(got.item_status) == [got.WILL_TOUCH] and abs(got.time[0] - 1.75) <= TIME_TOLERANCE
+    )
 
 
 def test_cull(client) -> None:

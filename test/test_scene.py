@@ -12,6 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scene_answers import rows_of, scene_of
 
 import geomsrv as gs
 from geomsrv.answers import ContactStatus, DistanceStatus
@@ -64,12 +65,6 @@ def solid_scene(n, seed, span=5.0, half_spaces=1):
     return objects
 
 
-def scene_of(objects, **options):
-    scene = gs.Scene(**options)
-    scene.apply(gs.SceneUpdate(add=objects))
-    return scene
-
-
 def relative_pose(a, b):
     """Pose of b in a, by matrices: another way than the scene's."""
     turn_a, turn_b = (gs._validate.rotation_matrices(np.asarray(pose)[None, 3:])[0] for pose in (a, b))
@@ -97,10 +92,6 @@ def brute_force(objects, want=("distance",)):
         (a.id, b.id): gs.distance(a.shape, b.shape, relative_pose(a.pose, b.pose), want=want)
         for a, b in itertools.combinations(objects, 2)
     }
-
-
-def rows_of(answer):
-    return dict(zip(zip(answer.ids_a, answer.ids_b, strict=True), range(len(answer)), strict=True))
 
 
 def same_answers(a, b):

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from scene_answers import rows_of, scene_of
 
 import geomsrv as gs
 from geomsrv.answers import ContactStatus
@@ -57,16 +58,6 @@ def random_objects(rng, count, turning, flat=False):
             twist[:3], twist[3:] = rng.normal(size=3), rng.normal(size=3) * turning
         objects.append(gs.SceneObject(f"{k:02}", shape, pose, twist * (rng.random() < 0.8)))
     return objects
-
-
-def scene_of(objects):
-    scene = gs.Scene()
-    scene.apply(gs.SceneUpdate(add=objects))
-    return scene
-
-
-def rows_of(answer):
-    return {pair: k for k, pair in enumerate(zip(answer.ids_a, answer.ids_b, strict=True))}
 
 
 # ----------------------------------------------------------------------------------------------------------- margins

@@ -13,6 +13,7 @@ import pytest
 from conftest import reproducer
 from oracle import frustum_box, polytope
 from oracle.vectors import dot, exact, root_double
+from scene_answers import rows_of, scene_of
 
 import geomsrv as gs
 from geomsrv.answers import ContactStatus
@@ -63,16 +64,6 @@ def rings(rng, count=14, span=2.5, speed=1.0, uncertainty=0.0):
         twist = (*(speed * rng.normal(size=2)), 0.0, 0.0, 0.0, 0.0)
         out.append(gs.SceneObject(f"{k:02}", gs.Polygon(ring), pose, twist, uncertainty=uncertainty))
     return out
-
-
-def scene_of(objects):
-    scene = gs.Scene()
-    scene.apply(gs.SceneUpdate(add=objects))
-    return scene
-
-
-def rows_of(answer):
-    return {pair: k for k, pair in enumerate(zip(answer.ids_a, answer.ids_b, strict=True))}
 
 
 def all_pairs(world):
