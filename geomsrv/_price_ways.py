@@ -27,6 +27,7 @@ from geomsrv.answers import (
     Distances,
     DistanceStatus,
     FirstContacts,
+    gather,
 )
 from geomsrv.errors import NotAvailableError
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
@@ -47,7 +48,6 @@ from geomsrv.shapes import (
     Shape,
     Sphere,
 )
-from geomsrv.world import gather
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

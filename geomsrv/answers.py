@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Booleans",
+    "Bounded",
     "Certificates",
     "CollisionTimes",
     "ContactStatus",
@@ -31,6 +32,7 @@ __all__ = [
     "FirstContacts",
     "FrustumRegion",
     "end_to_end",
+    "gather",
     "sets_end_to_end",
 ]
 
@@ -96,9 +98,9 @@ class Cost:
     elapsed_ns : int
         Wall time inside the query, validation included.
     accuracy : str
-        The tier that answered.
+        The tier that answered; where it was chosen item by item, the highest.
     counts : dict of str to int
-        Items decided per stage, by the stage's name.
+        Items decided per stage, by the stage's name; "tier float64" and so on where the tier was chosen item by item.
     """
 
     elapsed_ns: int
@@ -156,8 +158,26 @@ def _in_hex(value: Any) -> Any:
     return [_in_hex(item) for item in value] if isinstance(value, list) else value
 
 
+class Bounded:
+    """An answer that says how far off it may be."""
+
+    @property
+    def error_bound(self) -> float:
+        """Widest proven interval of all items [m, of times s]; inf where something is not proven, 0 if all is.
+
+        Of states and booleans: 0 if all are certain, else inf.
+        """
+        known = vars(self)
+        if "lower" not in known and "time_lower" not in known:
+            certain: BoolArray = known["certain"]
+            return 0.0 if bool(certain.all()) else float("inf")
+        lower, upper = (known[name if name in known else f"time_{name}"] for name in ("lower", "upper"))
+        with np.errstate(invalid="ignore"):  # inf - inf of a time beyond the doubles
+            return float(np.fmax.reduce(np.where(lower == upper, 0.0, upper - lower), initial=0.0))
+
+
 @dataclass(frozen=True, eq=False)
-class _Certified:
+class _Certified(Bounded):
     """An answer that can be asked for with ``certificates=True``."""
 
     _record: Callable[[Any, int], Record] | None = field(default=None, repr=False, kw_only=True)
@@ -335,6 +355,18 @@ def end_to_end(items: Sequence[FloatArray], width: int) -> tuple[FloatArray, Int
     return np.concatenate([np.zeros((0, width)), *items]), offsets
 
 
+def gather(vertices: FloatArray, offsets: IntArray, rows: IntArray) -> tuple[FloatArray, IntArray]:
+    """The listed rows of a ragged array, end to end, and their offsets."""
+    if len(rows) == 1:
+        only = vertices[offsets[rows[0]] : offsets[rows[0] + 1]]
+        return only, np.array([0, len(only)])
+    counts = offsets[rows + 1] - offsets[rows]
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    # Position k of the output belongs to the item whose stretch it falls in, and lies as far into it.
+    source = np.arange(ends[-1]) + np.repeat(offsets[rows] - ends[:-1], counts)
+    return vertices[source], ends
+
+
 def sets_end_to_end(sets: Iterable[Sequence[FloatArray]], width: int) -> tuple[FloatArray, IntArray, IntArray]:
     """Contact sets, each a list of parts (m, d): ``points``, ``point_offsets`` and ``part_offsets`` of an answer."""
     listed = list(sets)
@@ -343,7 +375,7 @@ def sets_end_to_end(sets: Iterable[Sequence[FloatArray]], width: int) -> tuple[F
 
 
 @dataclass(frozen=True, eq=False)
-class CollisionTimes:
+class CollisionTimes(Bounded):
     """Answer of `time_to_collision`.
 
     Attributes

@@ -14,7 +14,7 @@ from typing import Any
 
 from geomsrv import _validate
 from geomsrv.errors import GeometryError
-from geomsrv.queries import TIERS
+from geomsrv.ladder import AUTO
 
 __all__ = ["Config", "Setting", "settings"]
 
@@ -103,10 +103,10 @@ class Config:
         "world", "fixed_frame", "Frame in which the scene is kept and all answers are given.", read_only=True
     )
     accuracy: str = _setting(
-        "float64",
+        AUTO,
         "accuracy",
-        "Tier of the topics, and of service requests that name none.",
-        choices=_validate.ACCURACIES,
+        "Tier of the topics, and of service requests that name none; auto: for each item the cheapest that will do.",
+        choices=(AUTO, *_validate.ACCURACIES),
     )
     max_rate: float = _setting(
         30.0,
@@ -144,7 +144,7 @@ class Config:
     contacts_margin: float = _setting(
         0.0,
         "contacts.margin",
-        "Pairs on ~/contacts are in contact when they come as near as this; above 0 at accuracy float64 only.",
+        "Pairs on ~/contacts are in contact when they come as near as this; above 0 at accuracy auto and float64 only.",
         unit="m",
         minimum=0.0,
     )
@@ -196,8 +196,7 @@ class Config:
             fault = setting.fault(getattr(self, item.name), item.default)
             if fault:
                 raise GeometryError(fault)
-        _validate.accuracy(self.accuracy, TIERS)
-        if self.contacts_margin > 0.0 and self.accuracy != "float64":
+        if self.contacts_margin > 0.0 and self.accuracy not in (AUTO, "float64"):
             raise GeometryError(f"contacts.margin must be 0 at accuracy {self.accuracy}, got {self.contacts_margin:g}")
         if not self.camera_far > self.camera_near:
             raise GeometryError(f"camera.far must be > camera.near = {self.camera_near:g}, got {self.camera_far:g}")

@@ -16,15 +16,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geomsrv.answers import Cost
 from geomsrv.config import Config
 from geomsrv.crosscheck import CrossCheck
+from geomsrv.ladder import AUTO
 from geomsrv.pairwise import ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
 from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.world import World
 
-__all__ = ["Engine", "Evaluation", "SceneContacts", "Stage"]
+__all__ = ["Engine", "Evaluation", "SceneContacts", "Stage", "Totals"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -65,6 +67,18 @@ class SceneContacts:
     checked: int
 
 
+class Totals:
+    """What queries cost since the start, by name and tier."""
+
+    def __init__(self) -> None:
+        self.rows: dict[tuple[str, str], tuple[int, int, int]] = {}  #: calls, items, time [ns]
+
+    def add(self, query: str, cost: Cost, items: int) -> None:
+        """Count one call."""
+        calls, total, spent = self.rows.get((query, cost.accuracy), (0, 0, 0))
+        self.rows[query, cost.accuracy] = calls + 1, total + items, spent + cost.elapsed_ns
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Answers of one evaluation; None where the plan says no."""
@@ -93,6 +107,7 @@ class Engine:
         Time of the newest input, as it came; None before.
     counters : Counter
         How often each stage ran, by name.
+    totals : Totals
     cross_check : CrossCheck
     failing : bool
         Whether the last evaluation raised.
@@ -104,6 +119,7 @@ class Engine:
         self.camera: Frustum | None = None
         self.stamp: Any = None
         self.counters: Counter[str] = Counter()
+        self.totals = Totals()
         self.cross_check = _cross_check(config)
         self.failing = False
 
@@ -186,7 +202,10 @@ class Engine:
                 (not config.effects_first_contact, "switched off by effects.first_contact"),
                 (config.horizon == 0.0, "the horizon is 0"),
                 (self.turning_count == 0, "nothing turns"),
-                (config.accuracy != "float64", f"turning objects are followed at float64, not at {config.accuracy}"),
+                (
+                    config.accuracy not in (AUTO, "float64"),
+                    f"turning objects are followed at float64, not at {config.accuracy}",
+                ),
             ),
             _stage("contact_set", *contact, (not config.effects_contact_set, "switched off by effects.contact_set")),
             _stage(
@@ -235,7 +254,9 @@ class Engine:
     def _visible(self, _: frozenset[str]) -> SceneCull:
         assert self.camera is not None  # the plan says so
         self.counters["cull"] += 1
-        return self.scene.cull(self.camera, accuracy=self.config.accuracy)
+        seen = self.scene.cull(self.camera, accuracy=self.config.accuracy)
+        self.totals.add("~/visible", seen.cost, len(seen.ids))
+        return seen
 
     def _distances(self, on: frozenset[str]) -> PairDistances:
         self.counters["distance"] += 1
@@ -243,6 +264,7 @@ class Engine:
         for effect in want[1:]:
             self.counters[effect] += 1
         answer = self.scene.distances(self.config.max_distance, want=want, accuracy=self.config.accuracy)
+        self.totals.add("~/distances", answer.cost, len(answer))
         if "cross_check" in on:
             self.counters["cross_check"] += 1
             self.cross_check.submit_scene(self.scene, answer)
@@ -267,6 +289,7 @@ class Engine:
         if "penetration" in on and (pairs.time == 0.0).any():
             self.counters["penetration"] += 1
             depth = _depths(pairs, self.scene.contacts(accuracy=self.config.accuracy))
+        self.totals.add("~/contacts", pairs.cost, len(pairs))
         counts = pairs.cost.counts
         return SceneContacts(pairs, depth, horizon, margin, counts.get("pairs", 0) - counts.get("allowed", 0))
 

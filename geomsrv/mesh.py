@@ -303,7 +303,7 @@ def _first_turning(q: _Question) -> _Row:
     low, high = float(lower[first]), float(np.fmin.reduce(found.column("time_upper")))
     row.numbers = (low, low, high, np.nan)
     row.status = int(status[first])
-    if row.status == ContactStatus.GRAZING and high - low <= q.options["tolerance"]:
+    if row.status == ContactStatus.GRAZING and high - low <= (q.options["tolerance"] or 0.0):
         row.status = ContactStatus.WILL_TOUCH
     for at_once in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING):
         row.status = at_once if (status == at_once).any() else row.status

@@ -31,16 +31,18 @@ def sliding_meshes(world: World, pairs: IntArray, horizon: float) -> BoolArray:
     return sliding
 
 
-def mesh_contacts(world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]) -> ContactRows:
+def mesh_contacts(
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], contact_set: bool = True
+) -> ContactRows:
     """First contact of every such pair that has one; there is no kernel in single precision."""
     count_kinds(world, pairs, counts)
     tier = tier if tier in SOLID_MOTION_TIERS else "float64"
     bodies: dict[int, Mesh | Boxes | Polytopes] = {}
     for row in np.unique(pairs).tolist():
         bodies[row] = _placed(world, row)
+    how: dict[str, Any] = {"t_max": horizon, "accuracy": tier, "contact_set": contact_set}
     answers = [
-        first_contact(bodies[i], bodies[j], world.twists[i, :3], world.twists[j, :3], t_max=horizon, accuracy=tier)
-        for i, j in pairs.tolist()
+        first_contact(bodies[i], bodies[j], world.twists[i, :3], world.twists[j, :3], **how) for i, j in pairs.tolist()
     ]
     for answer in answers:
         counts["pairs of pieces"] += answer.cost.counts.get("pairs of pieces", 0)
@@ -60,6 +62,7 @@ def mesh_contacts(world: World, pairs: IntArray, horizon: float, tier: str, coun
         last_time=column("last_time"),
         normal=column("normal"),
         points=points,
+        certain=column("certain"),
     )
     return rows.take(~np.isnan(rows.time))
 

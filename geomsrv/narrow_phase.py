@@ -27,10 +27,12 @@ from geomsrv.answers import (
     DistanceStatus,
     FloatArray,
     IntArray,
+    gather,
     sets_end_to_end,
 )
-from geomsrv.queries import RUNGS, SOLID_MOTION_TIERS
-from geomsrv.world import ROUNDOFF, World, gather, supported_kinds
+from geomsrv.ladder import Quality, climb, narrow
+from geomsrv.queries import MEASURING, RUNGS, SOLID_MOTION_TIERS, TIERS
+from geomsrv.world import ROUNDOFF, World, supported_kinds
 
 __all__ = [
     "ContactRows",
@@ -90,12 +92,13 @@ class _Rows:
     pairs: IntArray
 
     @classmethod
-    def _columns(cls) -> list[str]:
+    def columns(cls) -> list[str]:
+        """Their names, in order."""
         return [field.name for field in fields(cls)]  # type: ignore[arg-type]  # every subclass is a dataclass
 
     def take(self, rows: IntArray | BoolArray) -> Self:
         """The listed rows."""
-        return type(self)(*(getattr(self, name)[rows] for name in self._columns()))
+        return type(self)(*(getattr(self, name)[rows] for name in self.columns()))
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
@@ -103,7 +106,7 @@ class _Rows:
         filled = [part for part in parts if len(part.pairs)]
         if len(filled) < 2:
             return filled[0] if filled else parts[0]
-        whole = cls(*(np.concatenate([getattr(part, name) for part in filled]) for name in cls._columns()))
+        whole = cls(*(np.concatenate([getattr(part, name) for part in filled]) for name in cls.columns()))
         return whole.take(np.lexsort(whole.pairs.T[::-1]))
 
 
@@ -161,6 +164,7 @@ class ContactRows(_Rows):
     last_time: FloatArray
     normal: FloatArray
     points: NDArray[np.object_]  #: (k,) contact set (m, 3) of every row, a list of such if it may have parts, or None
+    certain: BoolArray  #: exact arithmetic on the same numbers gives the same status
 
     @classmethod
     def silent(cls, pairs: IntArray) -> ContactRows:
@@ -168,7 +172,7 @@ class ContactRows(_Rows):
         count = len(pairs)
         status, unknown = np.full(count, ContactStatus.UNSUPPORTED, np.uint8), np.full(count, np.nan)
         normal, points = np.full((count, 3), np.nan), np.empty(count, dtype=object)
-        return cls(pairs, status, unknown, unknown, unknown, unknown, normal, points)
+        return cls(pairs, status, unknown, unknown, unknown, unknown, normal, points, np.ones(count, np.bool_))
 
 
 def count_kinds(world: World, pairs: IntArray, counts: Counter[str]) -> None:
@@ -185,6 +189,35 @@ def count_rungs(tier: str, totals: Iterable[int], counts: Counter[str]) -> None:
 
 
 # --------------------------------------------------------------------------------------------------- distance
+
+
+def climbed_distance_rows(
+    world: World, pairs: IntArray, penetration: bool, quality: Quality, counts: Counter[str], limit: float, points: bool
+) -> tuple[DistanceRows, Unsupported, str]:
+    """The same at the cheapest tiers that will do, and the highest of them.
+
+    Whether a pair is within the `limit` [m] is all that is asked of one that is not; with `points` nearest points are
+    wanted, too, which bounding volumes do not have.
+    """
+    missing = [Unsupported.none()]
+    rungs = quality.rungs(TIERS, MEASURING, lengths=True)
+
+    def solve(chosen: IntArray, tier: str) -> tuple[DistanceRows, IntArray]:
+        rows, unsupported = distance_rows(world, chosen, penetration, tier, counts)
+        missing.append(unsupported)
+        return rows, rows.pairs
+
+    def settled(rows: DistanceRows, tier: str) -> BoolArray:
+        beyond = rows.lower > limit
+        if tier == "bound" and len(rungs) > 1 and (points or quality.tolerance is None):
+            return beyond
+        good: BoolArray = (rows.status == DistanceStatus.OK) & narrow(rows.lower, rows.upper, quality.tolerance)
+        return beyond | good
+
+    found = climb(pairs, rungs, solve, settled, quality)
+    rows = found.rows(DistanceRows)
+    rows.status[~found.settled & (rows.status == DistanceStatus.OK)] = DistanceStatus.NOT_CONVERGED
+    return rows, Unsupported.joined(missing), found.count_tiers(counts)
 
 
 def distance_rows(
@@ -295,7 +328,7 @@ def _widened(lower: FloatArray, upper: FloatArray, by: FloatArray, signed: bool)
 
 
 def first_contact_rows(
-    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str]
+    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], contact_set: bool = True
 ) -> tuple[ContactRows, Unsupported]:
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     planar = world.planar[pairs[:, 0]]
@@ -310,9 +343,9 @@ def first_contact_rows(
         count_kinds(world, pairs[counted], counts)
     rows, unsupported = [ContactRows.silent(_NO_PAIRS)], [Unsupported.none()]
     if len(sliding):
-        rows.append(_sliding(world, sliding, polygon_contacts, horizon, tier, counts))
+        rows.append(_sliding(world, sliding, polygon_contacts, horizon, tier, counts, contact_set))
     if moving.any():
-        rows.append(_sliding(world, pairs[moving], solid_contacts, horizon, tier, counts))
+        rows.append(_sliding(world, pairs[moving], solid_contacts, horizon, tier, counts, contact_set))
     if len(spinning):
         answered, missing = _spinning_polygons(world, spinning, tier, counts)
         rows.append(answered)
@@ -324,15 +357,21 @@ def first_contact_rows(
     return ContactRows.joined(rows), Unsupported.joined(unsupported)
 
 
-_Kernel = Callable[[World, IntArray, FloatArray, float, str, Counter[str]], ContactRows]
+_Kernel = Callable[[World, IntArray, FloatArray, float, str, Counter[str], bool], ContactRows]
 
 
 def _sliding(
-    world: World, pairs: IntArray, kernel: _Kernel, horizon: float, tier: str, counts: Counter[str]
+    world: World,
+    pairs: IntArray,
+    kernel: _Kernel,
+    horizon: float,
+    tier: str,
+    counts: Counter[str],
+    contact_set: bool,
 ) -> ContactRows:
     """Bodies in translation: what the engine answers, and what their uncertainty makes of it."""
     if not (world.uncertainty.any() or world.velocity_uncertainty.any()):
-        rows = kernel(world, pairs, world.twists, horizon, tier, counts)
+        rows = kernel(world, pairs, world.twists, horizon, tier, counts, contact_set)
         return rows.take(rows.status != ContactStatus.NEVER)
     uncertainty = world.uncertainty[pairs].sum(axis=1)
     # A velocity that is off displaces by no more than this until the end of the time looked at.
@@ -340,7 +379,8 @@ def _sliding(
     uncertainty += np.multiply(drift, horizon, out=np.zeros_like(drift), where=drift > 0.0)
     # What follows relies on normals as good as SPEED_ROUNDING says.
     vague = uncertainty.any()
-    rows = kernel(world, pairs, world.twists, horizon, "float64" if vague and tier == "float32" else tier, counts)
+    kept = "float64" if vague and tier == "float32" else tier
+    rows = kernel(world, pairs, world.twists, horizon, kept, counts, contact_set)
     if not vague:
         return rows.take(rows.status != ContactStatus.NEVER)
     never = rows.status == ContactStatus.NEVER
@@ -370,16 +410,23 @@ def _planar(world: World, pairs: IntArray) -> bool:
 
 
 def polygon_contacts(
-    world: World, pairs: IntArray, velocities: FloatArray, horizon: float, tier: str, counts: Counter[str]
+    world: World,
+    pairs: IntArray,
+    velocities: FloatArray,
+    horizon: float,
+    tier: str,
+    counts: Counter[str],
+    contact_set: bool = True,
 ) -> ContactRows:
     """The engine's answer for polygons with the given velocities."""
     rings = (*gather(*world.rings, pairs[:, 0]), *gather(*world.rings, pairs[:, 1]))
     velocity_a, velocity_b = (np.ascontiguousarray(velocities[pairs[:, k], :2]) for k in range(2))
-    status, time, lower, upper, last, normal, points, offsets, *_, rungs = _core.first_contact_polygons(
-        *rings, velocity_a, velocity_b, horizon, True, tier
+    status, time, lower, upper, last, normal, points, offsets, certain, rungs = _core.first_contact_polygons(
+        *rings, velocity_a, velocity_b, horizon, contact_set, tier
     )
     count_rungs(tier, rungs, counts)
-    return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), _sets(_in_space(points), offsets))
+    sets = _sets(_in_space(points), offsets)
+    return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets, certain)
 
 
 def followed_solids(world: World) -> BoolArray:
@@ -392,7 +439,13 @@ def followed_solids(world: World) -> BoolArray:
 
 
 def solid_contacts(
-    world: World, pairs: IntArray, velocities: FloatArray, horizon: float, tier: str, counts: Counter[str]
+    world: World,
+    pairs: IntArray,
+    velocities: FloatArray,
+    horizon: float,
+    tier: str,
+    counts: Counter[str],
+    contact_set: bool = True,
 ) -> ContactRows:
     """The engine's answer for boxes and hulls with the given velocities; there is no kernel in single precision."""
     tier = tier if tier in SOLID_MOTION_TIERS else "float64"
@@ -400,11 +453,12 @@ def solid_contacts(
     for part, side_a, side_b in _by_kind(world, pairs):
         here = pairs[part]
         velocity_a, velocity_b = (np.ascontiguousarray(velocities[here[:, k], :3]) for k in range(2))
-        status, time, lower, upper, last, normal, points, offsets, *_, rungs = _core.first_contact_world(
-            side_a, side_b, velocity_a, velocity_b, horizon, True, tier
+        status, time, lower, upper, last, normal, points, offsets, certain, _, rungs = _core.first_contact_world(
+            side_a, side_b, velocity_a, velocity_b, horizon, contact_set, tier
         )
         count_rungs(tier, rungs, counts)
-        answered.append(ContactRows(here, status, time, lower, upper, last, normal, _sets(points, offsets)))
+        sets = _sets(points, offsets)
+        answered.append(ContactRows(here, status, time, lower, upper, last, normal, sets, certain))
     return ContactRows.joined(answered)
 
 
@@ -622,6 +676,7 @@ def near_at_rest(
         np.where(near, horizon, np.nan),
         np.where(near[:, None], rows.normal, np.nan),
         points,
+        (rows.lower > margin) | (rows.upper <= margin),
     )
     return answered, missing
 
@@ -667,6 +722,7 @@ def _solid_contacts(
         np.where(touching & resting, horizon, np.nan),
         np.where((touching & ~by_volumes)[:, None], rows.normal, np.nan),
         points,
+        (rows.lower > 0.0) | (rows.upper <= 0.0) | (tier == "exact"),
     )
     moving = status == ContactStatus.UNSUPPORTED
     turning = moving & world.turns[rows.pairs].any(axis=1)

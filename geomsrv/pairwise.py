@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _core, _validate
-from geomsrv.answers import BoolArray, ByteArray, ContactStatus, Cost, DistanceStatus, FloatArray, IntArray
+from geomsrv.answers import BoolArray, Bounded, ByteArray, ContactStatus, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.errors import GeometryError
+from geomsrv.ladder import Quality, climb, narrow
 from geomsrv.narrow_phase import (
     NO_DISTANCE,
     RELATIVE_POSE_ROUNDING,
@@ -30,9 +31,9 @@ from geomsrv.narrow_phase import (
     solid_distances,
 )
 from geomsrv.placement import laid_flat
-from geomsrv.queries import RUNGS, TIERS
+from geomsrv.queries import MEASURING, RUNGS, TIERS
 from geomsrv.shapes import Frustum, Shape
-from geomsrv.turning_pairs import closing_speeds, contact_rows, nearness
+from geomsrv.turning_pairs import Question, climbed_contact_rows, closing_speeds, contact_rows, nearness
 from geomsrv.world import ShapeTable, World
 
 __all__ = [
@@ -51,7 +52,7 @@ NOT_COMPARED = "polygons are compared with polygons only"
 
 
 @dataclass(frozen=True, eq=False)
-class ListedDistances:
+class ListedDistances(Bounded):
     """Distances of n listed pairs.
 
     Attributes
@@ -79,7 +80,7 @@ class ListedDistances:
 
 
 @dataclass(frozen=True, eq=False)
-class ListedContacts:
+class ListedContacts(Bounded):
     """First contacts of n listed pairs.
 
     Attributes
@@ -224,11 +225,20 @@ def _checked(
 
 
 def listed_distances(
-    world: World, pairs: IntArray, *, want: Sequence[str] = ("distance",), accuracy: str = "float64"
+    world: World,
+    pairs: IntArray,
+    *,
+    want: Sequence[str] = ("distance",),
+    accuracy: str = "float64",
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> ListedDistances:
-    """Distances of listed pairs, (n, 2) rows of `world`."""
+    """Distances of listed pairs, (n, 2) rows of `world`; how good they are asked to be as for `Scene.distances`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    tier = _validate.accuracy(accuracy, TIERS)
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if quality.climbs:
+        return _climbed_distances(world, pairs, want, quality)
+    tier = quality.accuracy
     penetration = "penetration" in _validate.want(want, ("distance", "witness", "penetration"))
     _distinct(world, pairs)
     _count(world, pairs, counts)
@@ -252,6 +262,39 @@ def listed_distances(
         normal=normal,
         message=_reasons(world, pairs[unsupported]) if unsupported.any() else "",
         cost=Cost(time.perf_counter_ns() - start, tier, dict(counts)),
+    )
+
+
+def _climbed_distances(world: World, pairs: IntArray, want: Sequence[str], quality: Quality) -> ListedDistances:
+    """The same, each pair at the cheapest tier that will do."""
+    start = time.perf_counter_ns()
+    rungs = quality.rungs(TIERS, MEASURING, lengths=True)
+    lacking = quality.tolerance is None or "witness" in want  # what bounding volumes cannot give
+
+    def solve(items: IntArray, tier: str) -> tuple[ListedDistances, IntArray]:
+        return listed_distances(world, pairs[items], want=want, accuracy=tier), items
+
+    def settled(answer: ListedDistances, tier: str) -> BoolArray:
+        hopeless: BoolArray = answer.status == DistanceStatus.UNSUPPORTED
+        if tier == "bound" and len(rungs) > 1 and lacking:
+            return hopeless
+        good: BoolArray = (answer.status == DistanceStatus.OK) & narrow(answer.lower, answer.upper, quality.tolerance)
+        return hopeless | good
+
+    _distinct(world, pairs)
+    found = climb(np.arange(len(pairs)), rungs, solve, settled, quality)
+    status = found.column("status")
+    status[~found.settled & (status == DistanceStatus.OK)] = DistanceStatus.NOT_CONVERGED
+    return ListedDistances(
+        status=status,
+        distance=found.column("distance"),
+        lower=found.column("lower"),
+        upper=found.column("upper"),
+        point_a=found.column("point_a"),
+        point_b=found.column("point_b"),
+        normal=found.column("normal"),
+        message=found.message(),
+        cost=found.cost(start),
     )
 
 
@@ -308,17 +351,31 @@ def _reasons(world: World, pairs: IntArray) -> str:
 
 
 def listed_first_contacts(
-    world: World, pairs: IntArray, horizon: float, *, margin: float = 0.0, accuracy: str = "float64"
+    world: World,
+    pairs: IntArray,
+    horizon: float,
+    *,
+    margin: float = 0.0,
+    accuracy: str = "float64",
+    tolerance: float | None = None,
+    time_budget: float | None = None,
+    contact_set: bool = True,
+    rotation: bool = True,
 ) -> ListedContacts:
-    """First contacts within `horizon` [s], at a `margin` [m], of listed pairs, (n, 2) rows of `world`."""
+    """First contacts of listed pairs, (n, 2) rows of `world`; all else as for `Scene.first_contacts`."""
     start, counts = time.perf_counter_ns(), Counter[str]()
-    near = nearness(margin, accuracy)
-    tier = _validate.accuracy(accuracy, TIERS)
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    near = nearness(margin, quality.accuracy)
     end = _validate.limit(horizon, "horizon")
-    if near == 0.0 and _all_slide(world, pairs):
-        return _sliding_polygons(world, pairs, end, tier, start)
+    tier = quality.accuracy
+    if near == 0.0 and not quality.climbs and _all_slide(world, pairs):
+        return _sliding_polygons(world, pairs, end, tier, start, contact_set)
     listed = _Listed(world, pairs)
-    rows, unsupported = contact_rows(world, listed.comparable, end, tier, counts, near)
+    question = Question(end, tier, near, contact_set=contact_set, rotation=rotation)
+    if quality.climbs:
+        rows, unsupported, tier = climbed_contact_rows(world, listed.comparable, question, quality, counts)
+    else:
+        rows, unsupported = contact_rows(world, listed.comparable, question, counts)
     at = listed.rows_among(rows.pairs)
     # A pair without a row never touches, or could not be compared at all.
     status = _take(rows.status, at, ContactStatus.NEVER)
@@ -355,11 +412,13 @@ def _all_slide(world: World, pairs: IntArray) -> bool:
     )
 
 
-def _sliding_polygons(world: World, pairs: IntArray, horizon: float, tier: str, start: int) -> ListedContacts:
+def _sliding_polygons(
+    world: World, pairs: IntArray, horizon: float, tier: str, start: int, contact_set: bool
+) -> ListedContacts:
     _distinct(world, pairs)
     counts = Counter[str]()
     _count(world, pairs, counts)
-    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon, tier, counts)
+    rows = polygon_contacts(world, pairs, world.twists[:, :2], horizon, tier, counts, contact_set)
     points, point_offsets, part_offsets = packed_sets(rows.points)
     return ListedContacts(
         status=rows.status,

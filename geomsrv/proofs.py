@@ -13,12 +13,12 @@ from functools import partial
 import numpy as np
 
 from geomsrv import _validate
-from geomsrv.answers import Cull, Distances, FirstContacts, IntArray, json_line
+from geomsrv.answers import Cull, Distances, FirstContacts, IntArray, gather, json_line
 from geomsrv.certificates import without_claim
 from geomsrv.narrow_phase import followed_solids, placed_hulls, relative_poses
 from geomsrv.queries import cull, distance, first_contact
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
-from geomsrv.world import AnyShape, World, gather
+from geomsrv.world import AnyShape, World
 
 __all__ = ["contact_certificates", "cull_certificates", "distance_certificates"]
 

@@ -22,6 +22,16 @@ from geomsrv.answers import (
 )
 from geomsrv.certificates import certify_contacts, certify_cull, certify_distances
 from geomsrv.errors import GeometryError
+from geomsrv.ladder import (
+    AUTO,
+    UNKNOWN,
+    Quality,
+    climbed_booleans,
+    climbed_contacts,
+    climbed_cull,
+    climbed_distances,
+    nothing_known,
+)
 from geomsrv.mesh import first_contact_meshes
 from geomsrv.region import Region, distance_regions, first_contact_regions, intersects_regions
 from geomsrv.shapes import (
@@ -37,8 +47,9 @@ from geomsrv.shapes import (
     Shape,
     Sphere,
     pack,
+    part_of,
 )
-from geomsrv.turning import first_contact_turning, turns
+from geomsrv.turning import TIME_TOLERANCE, first_contact_turning, turns
 
 __all__ = ["cull", "distance", "distance_to_frustum", "first_contact", "intersects"]
 
@@ -56,11 +67,29 @@ CULL_COUNTS = {
 }
 # What answers the others, in the order in which the engine counts it, and how far a tier climbs.
 RUNGS = ("bound", "filter", "wide", "exact")
+# Tiers that are worth a pass of their own, by what they cost and settle (`geomsrv price`): single precision is no
+# faster for solids; exact arithmetic, which begins with bounds or a filter of its own, is no slower for what a camera
+# sees, and in the plane.
+SEEING = ("exact",)
+MEASURING_POINTS = ("float64", "exact")
+MEASURING = ("bound", "float64", "exact")
+MEASURING_POLYGONS = ("bound", "float32", "exact")
+MEETING_POLYGONS = ("bound", "float32", "float64", "exact")
+MOVING_POLYGONS = ("exact",)
+MOVING = ("float64", "exact")
 SOLID_MOTION_TIERS = ("bound", "float64", "exact")  #: of first contact in space
 CLIMB = {"bound": RUNGS[:1], "float32": RUNGS[1:2], "float64": RUNGS[1:2], "exact": RUNGS[1:]}
 
 
-def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certificates: bool = False) -> Cull:
+def cull(
+    frustum: Frustum,
+    boxes: Boxes,
+    *,
+    accuracy: str = "float64",
+    certificates: bool = False,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
+) -> Cull:
     """Which boxes a camera frustum sees.
 
     Parameters
@@ -71,8 +100,14 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     accuracy : str
         Tier: "bound" looks at the sphere around a box only, and answers INTERSECTS where that is not outside or inside;
         "float32" and "float64" look at planes and axes, and say where rounding leaves a doubt; "exact" leaves none.
+        "auto" takes for each box the cheapest of "float64" and "exact" that is certain.
     certificates : bool
         Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+    tolerance : float, optional
+        Instead of a tier, how far [m] a box may be moved from where its state is right, > 0: each box is answered by
+        the cheapest tier that is certain, which is within any tolerance.
+    time_budget : float, optional
+        Seconds after which nothing more is begun, > 0: bounding volumes speak for the boxes that are then left.
 
     Returns
     -------
@@ -104,6 +139,16 @@ def cull(frustum: Frustum, boxes: Boxes, *, accuracy: str = "float64", certifica
     start = time.perf_counter_ns()
     _expect(frustum, Frustum, "frustum")
     _expect(boxes, Boxes, "boxes")
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if quality.climbs:
+        return climbed_cull(
+            lambda items, tier: cull(
+                frustum, part_of(boxes, items, len(boxes)), accuracy=tier, certificates=certificates
+            ),
+            len(boxes),
+            quality.rungs(TIERS, SEEING, certified=certificates),
+            quality,
+        )
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     given = frustum.packed(), boxes.center, boxes.axes, boxes.half_extents
@@ -127,6 +172,8 @@ def distance_to_frustum(
     accuracy: str = "float64",
     want: tuple[str, ...] = ("distance",),
     certificates: bool = False,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> Distances:
     """How far points are from a view frustum, and from which of its features.
 
@@ -142,6 +189,12 @@ def distance_to_frustum(
         "distance", and "witness" to find the nearest points right away instead of on first use.
     certificates : bool
         Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+    tolerance : float, optional
+        Instead of a tier, the widest interval [m] from ``lower`` to ``upper``, > 0: each item is answered by the
+        cheapest tier that proves it; NOT_CONVERGED where none does.  A tier other than "float64" and "auto" is kept to.
+    time_budget : float, optional
+        Seconds after which nothing more is begun, > 0: items that are then left have the interval proven so far, if
+        need be that of bounding volumes, and are NOT_CONVERGED.
 
     Returns
     -------
@@ -176,6 +229,17 @@ def distance_to_frustum(
         (_core.distance_to_frustum, 3) if isinstance(frustum, Frustum) else (_core.distance_to_frustum_2d, 2)
     )
     array = _validate.floats(points, "points", (None, dimension))
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if quality.climbs:
+        return climbed_distances(
+            lambda items, tier: distance_to_frustum(
+                frustum, part_of(array, items, len(array)), accuracy=tier, want=want, certificates=certificates
+            ),
+            len(array),
+            quality.rungs(TIERS, MEASURING_POINTS, lengths=True, certified=certificates),
+            quality,
+            points=True,
+        )
     tier = _validate.accuracy(accuracy, TIERS)
     certified = _validate.certificates(certificates, tier)
     effects = _validate.want(want, ("distance", "witness"))
@@ -216,7 +280,8 @@ def first_contact(
     angular_velocity_b: ArrayLike | None = None,
     center_a: ArrayLike | None = None,
     center_b: ArrayLike | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> FirstContacts:
     """When and where bodies first touch that translate, or translate and turn.
 
@@ -249,8 +314,13 @@ def first_contact(
     center_a, center_b : (n, d) or (d,) float, optional
         The points c at the start [m], which the bodies turn about.  By default the centre of a box, and otherwise the
         middle of the bounding box, ``0.5 * min + 0.5 * max`` of the vertices in float64.
-    tolerance : float
-        Widest time interval of WILL_TOUCH for bodies that turn [s], > 0; neighbouring doubles always do.
+    tolerance : float, optional
+        Widest time interval of WILL_TOUCH [s], > 0; neighbouring doubles always do.  Bodies that turn are followed
+        until it is met, by default 1e-6.  Others are answered by the cheapest tier that proves it; a tier other than
+        "float64" and "auto" is kept to.
+    time_budget : float, optional
+        Seconds after which nothing more is begun, > 0: items that are then left are NOT_CONVERGED, with what bounding
+        volumes say of ``time_lower``.
 
     Returns
     -------
@@ -315,30 +385,42 @@ def first_contact(
     by_pieces = first_contact_regions if isinstance(a, Region) or isinstance(b, Region) else None
     if isinstance(a, Mesh | Convex) or isinstance(b, Mesh | Convex):
         by_pieces = first_contact_meshes
-    if by_pieces is not None:
-        options: dict[str, Any] = {
-            "t_max": t_max,
-            "accuracy": accuracy,
-            "contact_set": contact_set,
-            "certificates": certificates,
+    turning = turns(angular_velocity_a, angular_velocity_b)
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if turning and quality.accuracy == AUTO:
+        accuracy = "float64"  # the only tier of bodies that turn, which are followed until the tolerance is met
+    options: dict[str, Any] = {
+        "t_max": t_max,
+        "contact_set": contact_set,
+        "certificates": certificates,
+        "tolerance": (quality.tolerance or TIME_TOLERANCE) if turning else None,
+    }
+    if time_budget is not None or (quality.climbs and not turning):
+        velocities = {"velocity_a": velocity_a, "velocity_b": velocity_b}
+        turn = {
             "angular_velocity_a": angular_velocity_a,
             "angular_velocity_b": angular_velocity_b,
             "center_a": center_a,
             "center_b": center_b,
-            "tolerance": tolerance,
+        }
+        return _climbed_contacts(a, b, velocities, turn, options, quality, turning)
+    if by_pieces is not None:
+        options |= {
+            "accuracy": accuracy,
+            "angular_velocity_a": angular_velocity_a,
+            "angular_velocity_b": angular_velocity_b,
+            "center_a": center_a,
+            "center_b": center_b,
         }
         return by_pieces(first_contact, a, b, (velocity_a, velocity_b), options)
-    if turns(angular_velocity_a, angular_velocity_b):
+    if turning:
         return first_contact_turning(
             (a, b),
             (velocity_a, velocity_b),
             (angular_velocity_a, angular_velocity_b),
             (center_a, center_b),
-            t_max=t_max,
-            tolerance=tolerance,
             accuracy=accuracy,
-            contact_set=contact_set,
-            certificates=certificates,
+            **options,
         )
     _expect(a, (Polygons, Polytopes, Boxes), "a")
     _expect(b, (Polygons,) if isinstance(a, Polygons) else (Polytopes, Boxes), "b")
@@ -378,6 +460,8 @@ def distance(
     accuracy: str = "float64",
     want: tuple[str, ...] = ("distance",),
     certificates: bool = False,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> Distances:
     """How far apart bodies are, their nearest points, and how deep they overlap.
 
@@ -394,6 +478,12 @@ def distance(
         "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
     certificates : bool
         Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+    tolerance : float, optional
+        Instead of a tier, the widest interval [m] from ``lower`` to ``upper``, > 0: each item is answered by the
+        cheapest tier that proves it; NOT_CONVERGED where none does.  A tier other than "float64" and "auto" is kept to.
+    time_budget : float, optional
+        Seconds after which nothing more is begun, > 0: items that are then left have the interval proven so far, if
+        need be that of bounding volumes, and are NOT_CONVERGED.
 
     Returns
     -------
@@ -416,7 +506,30 @@ def distance(
     array([2.])
     >>> gs.distance(gs.Sphere(1.0), gs.Sphere(1.0), [1.5, 0, 0, 0, 0, 0, 1], want=("penetration",)).distance
     array([-0.5])
+
+    A few millimetres are enough: bounding volumes prove that of spheres, of a box only arithmetic does.
+
+    >>> for shape in (gs.Sphere(1.0), gs.Box([1, 1, 1])):
+    ...     answer = gs.distance(shape, gs.Sphere(1.0), [4, 1, 0, 0, 0, 0, 1], tolerance=5e-3)
+    ...     print(answer.cost.accuracy, answer.error_bound <= 5e-3)
+    bound True
+    float64 True
     """
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if quality.climbs:
+        if poses_ab is not None:
+            _validate.poses(poses_ab, "poses_ab")
+        return climbed_distances(
+            lambda items, tier: distance(
+                *_parts(a, b, items), _poses_of(poses_ab, items), accuracy=tier, want=want, certificates=certificates
+            ),
+            _count(a, b, poses_ab),
+            quality.rungs(
+                TIERS, MEASURING_POLYGONS if _flat(a, poses_ab) else MEASURING, lengths=True, certified=certificates
+            ),
+            quality,
+            points="witness" in want,
+        )
     if isinstance(a, Region) or isinstance(b, Region):
         options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
         return distance_regions(distance, a, b, want, options)
@@ -471,6 +584,8 @@ def intersects(
     *,
     accuracy: str = "float64",
     certificates: bool = False,
+    tolerance: float | None = None,
+    time_budget: float | None = None,
 ) -> Booleans:
     """Whether bodies touch or overlap now.
 
@@ -482,6 +597,11 @@ def intersects(
         Tier; see the numerics page.
     certificates : bool
         Whether the answer is to carry its proof, see `verify`; at the tiers "float64" and "exact".
+    tolerance : float, optional
+        Instead of a tier, how far [m] a body may be moved from where the answer is right, > 0: each item is answered by
+        the cheapest tier that is certain, which is within any tolerance.
+    time_budget : float, optional
+        Seconds after which nothing more is begun, > 0: items that are then left have the answer of bounding volumes.
 
     Returns
     -------
@@ -500,6 +620,18 @@ def intersects(
     >>> answer.value, answer.certain
     (array([ True, False]), array([ True,  True]))
     """
+    quality = Quality.of(accuracy, tolerance, time_budget)
+    if quality.climbs:
+        if poses_ab is not None:
+            _validate.poses(poses_ab, "poses_ab")
+        return climbed_booleans(
+            lambda items, tier: intersects(
+                *_parts(a, b, items), _poses_of(poses_ab, items), accuracy=tier, certificates=certificates
+            ),
+            _count(a, b, poses_ab),
+            quality.rungs(TIERS, MEETING_POLYGONS if _flat(a, poses_ab) else MEASURING, certified=certificates),
+            quality,
+        )
     if isinstance(a, Region) or isinstance(b, Region):
         options = {"poses_ab": poses_ab, "accuracy": accuracy, "certificates": certificates}
         return intersects_regions(intersects, a, b, options)
@@ -523,6 +655,66 @@ def intersects(
         message=answer.message,
         _record=answer._record,
     )
+
+
+def _climbed_contacts(
+    a: Any,
+    b: Any,
+    velocities: dict[str, ArrayLike],
+    turn: dict[str, Any],
+    options: dict[str, Any],
+    quality: Quality,
+    turning: bool,
+) -> FirstContacts:
+    """`first_contact` by several tiers, or within a time budget."""
+    count, flat = _count(a, b, None), _flat(a, None)
+    d = 2 if flat else 3
+    for name, value in velocities.items():
+        _velocities(value, name, count, d)  # while the index of a fault is that of the caller
+    tiers: tuple[str, ...] = TIERS if flat else SOLID_MOTION_TIERS
+    ladder: tuple[str, ...] = MOVING_POLYGONS if flat else MOVING
+    if turning:
+        tiers, ladder = ("float64",), ("float64",)
+    rungs = quality.rungs(tiers, ladder, certified=options["certificates"])
+
+    def ask(items: NDArray[np.int64], tier: str) -> FirstContacts:
+        if tier == UNKNOWN:
+            return nothing_known(len(items), d)
+        moving = {name: part_of(np.asarray(value), items, count) for name, value in velocities.items()}
+        given: dict[str, Any] = {
+            name: part_of(np.asarray(value), items, count) for name, value in turn.items() if value is not None
+        }
+        side_a, side_b = _parts(a, b, items)
+        return first_contact(side_a, side_b, **moving, **given, **options, accuracy=tier)
+
+    return climbed_contacts(ask, count, rungs, quality)
+
+
+def _flat(a: Any, poses_ab: Any) -> bool:
+    """Whether the bodies are in the plane."""
+    return poses_ab is None and isinstance(a, Polygons | Region)
+
+
+def _count(a: Any, b: Any, poses_ab: Any) -> int:
+    """Number of items of a query."""
+    if poses_ab is not None:
+        given = np.asarray(poses_ab)
+        return len(given) if given.ndim == 2 else 1
+    lengths = (len(x) if isinstance(x, Boxes | Polygons | Polytopes) else 1 for x in (a, b))
+    return _validate.common_length(*lengths)
+
+
+def _parts(a: Any, b: Any, items: NDArray[np.int64]) -> tuple[Any, Any]:
+    """The listed items of both sides."""
+    lengths = [len(x) if isinstance(x, Boxes | Polygons | Polytopes) else 1 for x in (a, b)]
+    parts = [part_of(x, items, n) if n > 1 else x for x, n in zip((a, b), lengths, strict=True)]
+    return parts[0], parts[1]
+
+
+def _poses_of(poses_ab: Any, items: NDArray[np.int64]) -> Any:
+    """The listed poses."""
+    given = None if poses_ab is None else np.asarray(poses_ab)
+    return given if given is None or given.ndim == 1 else part_of(given, items, len(given))
 
 
 def _polygon_distance(

@@ -134,7 +134,9 @@ def first_contact_regions(
     first = np.where(status == ContactStatus.NEVER, np.inf, lower).argmin(axis=0)
     every = np.arange(count)
     outcome, low, high = status[first, every], lower[first, every], np.fmin.reduce(upper, axis=0)
-    outcome[(outcome == ContactStatus.GRAZING) & (high - low <= options["tolerance"])] = ContactStatus.WILL_TOUCH
+    outcome[(outcome == ContactStatus.GRAZING) & (high - low <= (options["tolerance"] or 0.0))] = (
+        ContactStatus.WILL_TOUCH
+    )
     overlap = status == ContactStatus.OVERLAPPING
     # Even if others do so too soon to be told apart.
     for at_once in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING):

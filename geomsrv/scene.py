@@ -21,17 +21,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _validate
-from geomsrv.answers import BoolArray, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
+from geomsrv.answers import BoolArray, Bounded, ByteArray, Cost, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
 from geomsrv.errors import GeometryError, SceneError
-from geomsrv.narrow_phase import DistanceRows, Unsupported, distance_rows, packed_sets
+from geomsrv.ladder import AUTO, Quality
+from geomsrv.narrow_phase import DistanceRows, Unsupported, climbed_distance_rows, distance_rows, packed_sets
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
-from geomsrv.queries import TIERS
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
-from geomsrv.turning_pairs import closing_speeds, contact_rows, first_contact_row, nearness
-from geomsrv.visibility import Visibility, sight
+from geomsrv.turning_pairs import (
+    Found,
+    Question,
+    climbed_contact_rows,
+    closing_speeds,
+    contact_rows,
+    first_contact_row,
+    nearness,
+)
+from geomsrv.visibility import Visibility, seen
 from geomsrv.world import ShapeTable, World
 
 __all__ = ["PairContacts", "PairDistances", "Scene", "SceneCull", "SceneObject", "SceneUpdate", "Visibility"]
@@ -108,7 +116,7 @@ class SceneUpdate:
 
 
 @dataclass(frozen=True, eq=False)
-class _PairRows:
+class _PairRows(Bounded):
     """Rows that belong to pairs of ids, and the pairs that nothing could be said about."""
 
     cost: Cost
@@ -224,7 +232,7 @@ class PairContacts(_PairRows):
 
 
 @dataclass(frozen=True, eq=False)
-class SceneCull:
+class SceneCull(Bounded):
     """Answer of `Scene.cull`; rows sorted by id.
 
     Attributes
@@ -470,6 +478,8 @@ class Scene:
         others: Iterable[str] | None = None,
         want: Sequence[str] = ("distance",),
         accuracy: str = "float64",
+        tolerance: float | None = None,
+        time_budget: float | None = None,
     ) -> PairDistances:
         """All pairs, allowed ones aside, that are at most `max_distance` apart.
 
@@ -488,6 +498,13 @@ class Scene:
             "distance", "witness", and "penetration" to measure how deep overlapping bodies are.
         accuracy : str
             Tier; see the class and the numerics page.  "bound" lists every pair whose bounding volumes are that near.
+            "auto" takes for each pair the cheapest tier that will do.
+        tolerance : float, optional
+            Instead of a tier, the widest interval [m] of a pair that is listed, > 0: each is measured by the cheapest
+            tier that proves it; NOT_CONVERGED where none does, as for uncertain vertices.
+        time_budget : float, optional
+            Seconds after which nothing more is begun, > 0: pairs that are then left are NOT_CONVERGED, with the
+            interval proven so far.
 
         Returns
         -------
@@ -500,14 +517,20 @@ class Scene:
         """
         start = time.perf_counter_ns()
         limit = _validate.limit(max_distance, "max_distance")
-        return self._distances(start, limit, ids, others, want, accuracy)
+        return self._distances(start, limit, ids, others, want, Quality.of(accuracy, tolerance, time_budget))
 
     def contacts(
-        self, *, ids: Iterable[str] | None = None, others: Iterable[str] | None = None, accuracy: str = "float64"
+        self,
+        *,
+        ids: Iterable[str] | None = None,
+        others: Iterable[str] | None = None,
+        accuracy: str = "float64",
+        tolerance: float | None = None,
+        time_budget: float | None = None,
     ) -> PairDistances:
         """All pairs that touch or overlap now, with penetration depth; arguments as for `distances`."""
         start = time.perf_counter_ns()
-        return self._distances(start, 0.0, ids, others, ("penetration",), accuracy)
+        return self._distances(start, 0.0, ids, others, ("penetration",), Quality.of(accuracy, tolerance, time_budget))
 
     def nearest_pair(
         self,
@@ -516,20 +539,25 @@ class Scene:
         others: Iterable[str] | None = None,
         want: Sequence[str] = ("distance",),
         accuracy: str = "float64",
+        tolerance: float | None = None,
     ) -> PairDistances:
         """The pair with the smallest distance, one row; no row if no pair is supported.
 
         Of equally near pairs the first by (id_a, id_b); with "penetration" in `want` the deepest.
         `unsupported` lists those that may be nearer.  At tier "bound" no pair is nearer than the answer's ``distance``.
-        Arguments as for `distances`.
+        Arguments as for `distances`.  The pair is found at "float64" unless a tier is asked for, and with a
+        `tolerance` then measured by one that proves it.
         """
         start = time.perf_counter_ns()
-        tier = _validate.accuracy(accuracy, TIERS)
+        quality = Quality.of(accuracy, tolerance)
+        tier = "float64" if quality.accuracy == AUTO else accuracy
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         rows, unsupported = nearest_rows(world, penetration, selection, tier, counts)
+        if quality.climbs:
+            rows, _, tier = climbed_distance_rows(world, rows.pairs, penetration, quality, counts, np.inf, True)
         return _pair_distances(world, rows, unsupported, start, tier, counts)
 
     def first_contacts(
@@ -541,6 +569,10 @@ class Scene:
         ids: Iterable[str] | None = None,
         others: Iterable[str] | None = None,
         accuracy: str = "float64",
+        tolerance: float | None = None,
+        time_budget: float | None = None,
+        contact_set: bool = True,
+        rotation: bool = True,
     ) -> PairContacts:
         """All pairs, allowed ones aside, that touch within the next `horizon` seconds if every twist stays as it is.
 
@@ -561,6 +593,16 @@ class Scene:
             the pairs looked at for that: those whose boxes meet later are not (``cost.counts["later"]``).
         ids, others, accuracy
             As for `distances`.
+        tolerance : float, optional
+            Widest time interval [s] of WILL_TOUCH, > 0, by default 1e-6 of what is followed step by step: each pair is
+            answered by the cheapest tier that proves it; NOT_CONVERGED where none does.
+        time_budget : float, optional
+            Seconds after which nothing more is begun, > 0: pairs that are then left are NOT_CONVERGED, with what
+            bounding volumes say of ``time_lower``.
+        contact_set : bool
+            Whether to find the contact points; without them ``points`` is empty.
+        rotation : bool
+            Whether to follow what turns; without it that is UNSUPPORTED unless it is in contact now.
 
         Returns
         -------
@@ -574,13 +616,19 @@ class Scene:
         start = time.perf_counter_ns()
         limit = _validate.limit(horizon, "horizon")
         near = nearness(margin, accuracy)
-        tier = _validate.accuracy(accuracy, TIERS)
+        quality = Quality.of(accuracy, tolerance, time_budget)
+        question = Question(limit, accuracy, near, contact_set=contact_set, rotation=rotation)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_swept(world, limit), near, selection, counts)
-        find = first_contact_row if earliest else contact_rows
-        rows, unsupported = find(world, pairs, limit, tier, counts, near)
+
+        def find(pairs: IntArray) -> Found:
+            if quality.climbs:
+                return climbed_contact_rows(world, pairs, question, quality, counts)
+            return *contact_rows(world, pairs, question, counts), accuracy
+
+        rows, unsupported, tier = first_contact_row(world, pairs, near, counts, find) if earliest else find(pairs)
         counts["unsupported"] += len(unsupported.pairs)
         return PairContacts(
             Cost(time.perf_counter_ns() - start, tier, dict(counts)),
@@ -600,7 +648,15 @@ class Scene:
             *packed_sets(rows.points),
         )
 
-    def cull(self, frustum: Frustum, *, ids: Iterable[str] | None = None, accuracy: str = "float64") -> SceneCull:
+    def cull(
+        self,
+        frustum: Frustum,
+        *,
+        ids: Iterable[str] | None = None,
+        accuracy: str = "float64",
+        tolerance: float | None = None,
+        time_budget: float | None = None,
+    ) -> SceneCull:
         """What a camera frustum sees of every object.
 
         Boxes, spheres, capsules, hulls, half spaces and polygons are judged themselves, other kinds by their
@@ -615,20 +671,24 @@ class Scene:
         ids : iterable of str, optional
             Only these objects.
         accuracy : str
-            Tier; see the numerics page.
+            Tier; see the numerics page.  "auto" takes for each object the cheapest that is certain.
+        tolerance : float, optional
+            As in `geomsrv.cull`.
+        time_budget : float, optional
+            Seconds after which nothing more is begun, > 0: bounding volumes speak for the objects that are then left.
 
         Returns
         -------
         SceneCull
         """
         start = time.perf_counter_ns()
-        tier = _validate.accuracy(accuracy, TIERS)
+        quality = Quality.of(accuracy, tolerance, time_budget)
         if not isinstance(frustum, Frustum):
             raise GeometryError(f"frustum must be Frustum, got {type(frustum).__name__}")
         world = self.world
         rows = np.arange(len(world)) if ids is None else np.flatnonzero(_members(world, ids, "ids"))
         counts: Counter[str] = Counter(objects=len(rows))
-        state, certain, boxed = sight(world, rows, frustum, tier, counts)
+        (state, certain, boxed), tier = seen(world, rows, frustum, quality, counts)
         message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
         return SceneCull(
             [world.ids[k] for k in rows.tolist()],
@@ -749,15 +809,20 @@ class Scene:
         ids: Iterable[str] | None,
         others: Iterable[str] | None,
         want: Sequence[str],
-        accuracy: str,
+        quality: Quality,
     ) -> PairDistances:
-        tier = _validate.accuracy(accuracy, TIERS)
         penetration = "penetration" in _validate.want(want, EFFECTS)
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
         pairs = _near(world, boxes_now(world), limit, selection, counts)
-        rows, unsupported = distance_rows(world, pairs, penetration, tier, counts)
+        tier = quality.accuracy
+        if quality.climbs:
+            rows, unsupported, tier = climbed_distance_rows(
+                world, pairs, penetration, quality, counts, limit, "witness" in want
+            )
+        else:
+            rows, unsupported = distance_rows(world, pairs, penetration, tier, counts)
         open_ended = (rows.uncertainty > 0.0) | (rows.status == DistanceStatus.NOT_CONVERGED)
         rows = rows.take((rows.distance <= limit) | (open_ended & (rows.lower <= limit)))
         return _pair_distances(world, rows, unsupported, start, tier, counts)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geomsrv import _core, _validate
+from geomsrv.answers import gather
 from geomsrv.errors import GeometryError
 from geomsrv.mesh_tree import Tree, ordered
 
@@ -417,6 +418,23 @@ class Boxes:
         center = self.center if origin is None else self.center - origin
         arms: FloatArray = np.einsum("ck,nk,nkd->ncd", CORNER_SIGNS, self.half_extents, self.axes)
         return center[:, None, :] + arms
+
+
+def part_of(value: Any, items: NDArray[np.int64], count: int) -> Any:
+    """The listed items of a batch of `count`, which were checked already; one body, or one row for all, as it is."""
+    if len(items) == count or (isinstance(value, np.ndarray) and len(value) != count):
+        return value
+    if isinstance(value, np.ndarray):
+        return np.ascontiguousarray(value[items])
+    if not isinstance(value, Boxes | _Ragged) or len(value) != count:
+        return value
+    part = object.__new__(type(value))
+    if isinstance(value, Boxes):
+        fields = {name: np.ascontiguousarray(getattr(value, name)[items]) for name in vars(value)}
+    else:
+        fields = dict(zip(("vertices", "offsets"), gather(value.vertices, value.offsets, items), strict=True))
+    part.__dict__.update(fields)
+    return part
 
 
 class _Ragged:

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _core, _validate
-from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray
+from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray, gather
 from geomsrv.errors import GeometryError
 from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze, vertices_of
-from geomsrv.world import ROUNDOFF, gather
+from geomsrv.world import ROUNDOFF
 
 __all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
 

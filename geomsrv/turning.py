@@ -15,7 +15,9 @@ from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import Boxes, Polygons, Polytopes
 
-__all__ = ["approach", "first_contact_turning", "middles", "turns", "velocity_at"]
+__all__ = ["TIME_TOLERANCE", "approach", "first_contact_turning", "middles", "turns", "velocity_at"]
+
+TIME_TOLERANCE = 1e-6  #: [s] widest interval of a contact, where no other is asked for
 
 Bodies = Boxes | Polygons | Polytopes
 

@@ -9,15 +9,20 @@ proves its bounds for all bodies within; status, time and contact point are thos
 
 from __future__ import annotations
 
+import time
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
 
 from geomsrv import _core, _validate
-from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
+from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray, gather
 from geomsrv.broad_phase import entry_times
 from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.ladder import AUTO, UNKNOWN, Quality, climb, narrow
 from geomsrv.mesh_pairs import mesh_contacts, sliding_meshes
 from geomsrv.narrow_phase import (
     ContactRows,
@@ -30,13 +35,19 @@ from geomsrv.narrow_phase import (
     placed_boxes,
     placed_hulls,
 )
-from geomsrv.turning import approach, velocity_at
-from geomsrv.world import ROUNDOFF, World, gather
+from geomsrv.queries import MOVING, MOVING_POLYGONS, SOLID_MOTION_TIERS, TIERS
+from geomsrv.turning import TIME_TOLERANCE, approach, velocity_at
+from geomsrv.world import ROUNDOFF, World
 
-__all__ = ["closing_speeds", "contact_rows", "first_contact_row", "followed_in_turning", "nearness"]
-
-# Widest time interval of a contact while nothing is uncertain [s].
-TIME_TOLERANCE = 1e-6
+__all__ = [
+    "Question",
+    "climbed_contact_rows",
+    "closing_speeds",
+    "contact_rows",
+    "first_contact_row",
+    "followed_in_turning",
+    "nearness",
+]
 
 # The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
 CAPSULE_ROUNDING = 16.0 * ROUNDOFF
@@ -46,58 +57,161 @@ NO_APPROACH = "first contact at a distance ({}) is unsupported"
 FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, beside polygons
 
 
-def contact_rows(
-    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], margin: float = 0.0
-) -> tuple[ContactRows, Unsupported]:
-    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel.
+@dataclass(frozen=True)
+class Question:
+    """What is asked of pairs in motion.
 
-    With a `margin` [m], at tier "float64", bodies are in contact that are no further apart.
+    Attributes
+    ----------
+    horizon : float
+        [s]
+    tier : str
+    margin : float
+        With one [m], at tier "float64", bodies are in contact that are no further apart.
+    tolerance : float
+        Widest time interval [s] of pairs that are followed step by step.
+    contact_set : bool
+        Whether contact points are wanted.
+    rotation : bool
+        Whether to follow what turns; without it a pair of which one does is unsupported unless it is in contact now.
     """
-    if margin > 0.0:
-        return _approaches(world, pairs, horizon, counts, margin)
-    if (meshes := sliding_meshes(world, pairs, horizon)).any():
-        rows, unsupported = contact_rows(world, pairs[~meshes], horizon, tier, counts)
-        return ContactRows.joined([mesh_contacts(world, pairs[meshes], horizon, tier, counts), rows]), unsupported
-    straight = not world.turns.any() and bool((world.planar | followed_solids(world)).all())
-    if tier != "float64" or horizon == 0.0 or straight:
-        return first_contact_rows(world, pairs, horizon, tier, counts)
+
+    horizon: float
+    tier: str = "float64"
+    margin: float = 0.0
+    tolerance: float = TIME_TOLERANCE
+    contact_set: bool = True
+    rotation: bool = True
+
+
+def contact_rows(
+    world: World, pairs: IntArray, question: Question, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
+    """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
+    if question.margin > 0.0:
+        rows, unsupported = _approaches(world, pairs, question, counts)
+    elif (meshes := sliding_meshes(world, pairs, question.horizon)).any():
+        others, unsupported = contact_rows(world, pairs[~meshes], question, counts)
+        found = mesh_contacts(
+            world, pairs[meshes], question.horizon, question.tier, counts, contact_set=question.contact_set
+        )
+        return ContactRows.joined([found, others]), unsupported
+    else:
+        followed = _followed(world, pairs, question)
+        rows, unsupported = first_contact_rows(
+            world, pairs[~followed], question.horizon, question.tier, counts, question.contact_set
+        )
+        if followed.any():
+            count_kinds(world, pairs[followed], counts)
+            if turning := int(world.turns[pairs[followed]].any(axis=1).sum()):
+                counts["rotation"] += turning
+            rows = ContactRows.joined([_turning_contacts(world, pairs[followed], question), rows])
+    if not question.contact_set:
+        rows.points[:] = None
+    return rows, unsupported
+
+
+def climbed_contact_rows(
+    world: World, pairs: IntArray, question: Question, quality: Quality, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported, str]:
+    """The same at the cheapest tiers that will do, and the highest of them; pairs that are followed have one only."""
+    question = replace(question, tier="float64", tolerance=quality.tolerance or question.tolerance)
+    stepwise = _followed(world, pairs, question) | (question.margin > 0.0)
+    planar = world.planar[pairs[:, 0]]
+    parts: list[ContactRows] = []
+    missing = [Unsupported.none()]
+    tiers: list[str] = []
+    began = time.perf_counter()
+    for chosen, available, ladder in (
+        (stepwise, ("float64",), ("float64",)),
+        (~stepwise & planar, TIERS, MOVING_POLYGONS),
+        (~stepwise & ~planar, SOLID_MOTION_TIERS, MOVING),
+    ):
+        if not chosen.any() and (parts or chosen is stepwise):
+            continue
+        left = max(quality.time_budget - (time.perf_counter() - began), 0.0)
+        here = replace(quality, time_budget=left)
+        fixed = quality.accuracy not in (AUTO, "float64")
+        rungs = here.rungs(available if not fixed else TIERS, ladder)
+        found = climb(
+            pairs[chosen], rungs, partial(_solve, world, question, counts, missing), partial(_settled, here), here
+        )
+        rows = found.rows(ContactRows)
+        vague = ~found.settled & ((rows.status != ContactStatus.TOUCHING) | ~rows.certain)
+        rows.lower[vague], rows.upper[vague & ~rows.certain] = np.nan_to_num(rows.lower[vague]), np.inf
+        rows.time[vague], rows.status[vague] = rows.lower[vague], ContactStatus.NOT_CONVERGED
+        parts.append(rows)
+        tiers.append(found.count_tiers(counts))
+    rows = ContactRows.joined(parts)
+    return rows, Unsupported.joined(missing), max(tiers, key=(UNKNOWN, *TIERS).index)
+
+
+def _solve(
+    world: World, question: Question, counts: Counter[str], missing: list[Unsupported], pairs: IntArray, tier: str
+) -> tuple[ContactRows, IntArray]:
+    """Rows at a tier; what is unsupported is collected."""
+    if tier == UNKNOWN:
+        rows = ContactRows.silent(pairs)
+        rows.status[:] = ContactStatus.NOT_CONVERGED
+        return replace(rows, certain=np.zeros(len(pairs), np.bool_)), pairs
+    rows, unsupported = contact_rows(world, pairs, replace(question, tier=tier), counts)
+    missing.append(unsupported)
+    return rows, rows.pairs
+
+
+def _settled(quality: Quality, rows: ContactRows, tier: str) -> BoolArray:
+    """(k,) bool: rows that need no higher tier."""
+    if tier == UNKNOWN:
+        return np.zeros(len(rows.pairs), np.bool_)
+    final = np.isin(rows.status, (ContactStatus.UNSUPPORTED, ContactStatus.NOT_CONVERGED, ContactStatus.GRAZING))
+    close = narrow(rows.lower, rows.upper, quality.tolerance) | (rows.status != ContactStatus.WILL_TOUCH)
+    sure: BoolArray = final | (rows.certain & close)
+    return sure
+
+
+def _followed(world: World, pairs: IntArray, question: Question) -> BoolArray:
+    """(k,) bool: pairs that are followed step by step: what turns, and what is round and moves."""
+    nothing = np.zeros(len(pairs), np.bool_)
+    if question.tier != "float64" or question.horizon == 0.0:
+        return nothing
+    if not world.turns.any() and (world.planar | followed_solids(world)).all():
+        return nothing
     turns = world.turns[pairs].any(axis=1)
-    followed = (turns | _rolling(world, pairs)) & followed_in_turning(world)[pairs].all(axis=1)
-    if not followed.any():
-        return first_contact_rows(world, pairs, horizon, tier, counts)
-    count_kinds(world, pairs[followed], counts)
-    if (rotating := followed & turns).any():
-        counts["rotation"] += int(rotating.sum())
-    rows, unsupported = first_contact_rows(world, pairs[~followed], horizon, tier, counts)
-    return ContactRows.joined([_turning_contacts(world, pairs[followed], horizon), rows]), unsupported
+    stepwise = (turns & question.rotation) | (~turns & _rolling(world, pairs))
+    followed: BoolArray = stepwise & followed_in_turning(world)[pairs].all(axis=1)
+    return followed
 
 
 FEW = 64  # pairs that are looked at before it is asked whether others can be earlier; from then on twice as many
 
 
+Found = tuple[ContactRows, Unsupported, str]  #: and the highest tier
+
+
 def first_contact_row(
-    world: World, pairs: IntArray, horizon: float, tier: str, counts: Counter[str], margin: float = 0.0
-) -> tuple[ContactRows, Unsupported]:
-    """As `contact_rows`, but only the row with the least time, and what is unsupported of the pairs looked at.
+    world: World, pairs: IntArray, margin: float, counts: Counter[str], find: Callable[[IntArray], Found]
+) -> Found:
+    """What `find` finds, but only the row with the least time, and what is unsupported of the pairs looked at.
 
     Pairs are taken in the order in which their boxes meet, until what is left meets later than contact is proven.
     """
     begin = entry_times(world, pairs, margin)
     order = np.argsort(begin, kind="stable")
-    found = [(ContactRows.silent(pairs[:0]), Unsupported.none())]
+    found = [find(pairs[:0])]
     first, done, size = np.inf, 0, FEW
     while done < len(order) and begin[order[done]] <= first + TIME_TOLERANCE:
         chosen = np.sort(order[done : done + size])
-        found.append(contact_rows(world, pairs[chosen], horizon, tier, counts, margin))
+        found.append(find(pairs[chosen]))
         first = min(first, np.fmin.reduce(found[-1][0].upper, initial=np.inf))
         done, size = done + len(chosen), 2 * size
     counts["later"] += len(order) - done
-    rows = ContactRows.joined([part for part, _ in found])
+    rows = ContactRows.joined([part for part, *_ in found])
     silent = rows.status == ContactStatus.UNSUPPORTED
     when = np.where(np.isnan(rows.time), np.inf, rows.time)
     if len(when) and (when < np.inf).any():
         silent[np.argmin(when)] = True
-    return rows.take(silent), Unsupported.joined([part for _, part in found])
+    tier = max((tier for *_, tier in found), key=(UNKNOWN, *TIERS).index)
+    return rows.take(silent), Unsupported.joined([part for _, part, _ in found]), tier
 
 
 def nearness(margin: float, accuracy: str) -> float:
@@ -111,21 +225,23 @@ def nearness(margin: float, accuracy: str) -> float:
     near = _validate.scalar(margin, "margin")
     if near < 0.0:
         raise GeometryError(f"margin must be >= 0, got {margin}")
-    if near > 0.0 and accuracy != "float64":
+    if near > 0.0 and accuracy not in (AUTO, "float64"):
         raise NotAvailableError(f"a margin is available at accuracy 'float64' only, not at {accuracy!r}")
     return near
 
 
 def _approaches(
-    world: World, pairs: IntArray, horizon: float, counts: Counter[str], margin: float
+    world: World, pairs: IntArray, question: Question, counts: Counter[str]
 ) -> tuple[ContactRows, Unsupported]:
     """When bodies come as near as the margin: a ball that large is added to one of them."""
+    horizon = question.horizon
     followed = followed_in_turning(world)[pairs].all(axis=1)
+    followed &= question.rotation | ~world.turns[pairs].any(axis=1)
     count_kinds(world, pairs[followed], counts)
-    rows = [_turning_contacts(world, pairs[followed], horizon, margin)] if followed.any() else []
+    rows = [_turning_contacts(world, pairs[followed], question)] if followed.any() else []
     others = pairs[~followed]
     resting = at_rest(world, others, horizon)
-    near, missing = near_at_rest(world, others[resting], horizon, counts, margin)
+    near, missing = near_at_rest(world, others[resting], horizon, counts, question.margin)
     moving = Unsupported.of_kinds(world, others[~resting], NO_APPROACH)
     return (
         ContactRows.joined([*rows, near, ContactRows.silent(missing.pairs), ContactRows.silent(moving.pairs)]),
@@ -171,15 +287,15 @@ def followed_in_turning(world: World) -> BoolArray:
     return followed
 
 
-def _turning_contacts(world: World, pairs: IntArray, horizon: float, margin: float = 0.0) -> ContactRows:
-    slack = _slack(world, pairs, margin)
-    status, lower, upper, normal, point = _ask(world, pairs, horizon, slack)
+def _turning_contacts(world: World, pairs: IntArray, question: Question) -> ContactRows:
+    slack = _slack(world, pairs, question.margin)
+    status, lower, upper, normal, point = _ask(world, pairs, question, slack)
     doubt = np.column_stack([world.uncertainty[pairs].sum(axis=1), world.velocity_uncertainty[pairs].sum(axis=1)])
     vague = np.flatnonzero(doubt.any(axis=1))
     time = lower.copy()
     if len(vague):
         slack[vague, 1:] += doubt[vague]
-        may, first, last, *_ = _ask(world, pairs[vague], horizon, slack[vague])
+        may, first, last, *_ = _ask(world, pairs[vague], question, slack[vague])
         never = status[vague] == ContactStatus.NEVER
         lower[vague] = np.where(never, first, np.fmin(first, lower[vague]))
         upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
@@ -190,12 +306,13 @@ def _turning_contacts(world: World, pairs: IntArray, horizon: float, margin: flo
     points = np.empty(len(pairs), dtype=object)
     for k in np.flatnonzero(~np.isnan(point[:, 0])).tolist():
         points[k] = point[k : k + 1]
-    rows = ContactRows(pairs, status, time, lower, upper, np.full(len(pairs), np.nan), normal, points)
+    certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)
+    rows = ContactRows(pairs, status, time, lower, upper, np.full(len(pairs), np.nan), normal, points, certain)
     return rows.take((status != ContactStatus.NEVER) | ~np.isnan(lower))
 
 
 def _ask(
-    world: World, pairs: IntArray, horizon: float, slack: FloatArray
+    world: World, pairs: IntArray, question: Question, slack: FloatArray
 ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Status, lower, upper, normal and point from the engine."""
     count = len(pairs)
@@ -210,7 +327,9 @@ def _ask(
             continue
         side_a, side_b = (_side(world, pairs[part, k], flat, is_box[k]) for k in range(2))
         motion_a, motion_b = (np.ascontiguousarray(motion[pairs[part, k]]) for k in range(2))
-        found = _core.first_contact_turning(side_a, side_b, motion_a, motion_b, horizon, TIME_TOLERANCE, slack[part])
+        found = _core.first_contact_turning(
+            side_a, side_b, motion_a, motion_b, question.horizon, question.tolerance, slack[part]
+        )
         status[part], lower[part], upper[part], normal[part], point[part] = found[:5]
     return status, lower, upper, normal, point
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from geomsrv import _core
 from geomsrv.answers import BoolArray, ByteArray, CullState, DistanceStatus, FloatArray, IntArray
 from geomsrv.broad_phase import AABB_ROUNDING
+from geomsrv.ladder import Quality, climb
 from geomsrv.narrow_phase import count_rungs
-from geomsrv.queries import CULL_COUNTS, CULL_STAGES, RUNGS
+from geomsrv.queries import CULL_COUNTS, CULL_STAGES, RUNGS, SEEING, TIERS
 from geomsrv.shapes import (
     Box,
     Capsule,
@@ -33,7 +34,7 @@ from geomsrv.shapes import (
 )
 from geomsrv.world import ROUNDOFF, AnyShape, World, own_numbers, supported_kinds
 
-__all__ = ["Sight", "Visibility", "boxed_kinds", "sight"]
+__all__ = ["Sight", "Visibility", "boxed_kinds", "seen", "sight"]
 
 Numbers = NDArray[Any]  #: float64, or fractions
 
@@ -79,6 +80,20 @@ def sight(world: World, rows: IntArray, frustum: Frustum, tier: str, counts: Cou
         counts["shapes"] += len(cut)
         outcome[cut], certain[cut], boxed = _by_shape(world, rows[cut], frustum, tier, counts)
     return Sight(outcome, certain, sorted(boxed))
+
+
+def seen(world: World, rows: IntArray, frustum: Frustum, quality: Quality, counts: Counter[str]) -> tuple[Sight, str]:
+    """The same at the tier asked for, or at the cheapest that will do, and the highest of them."""
+    if not quality.climbs:
+        return sight(world, rows, frustum, quality.accuracy, counts), quality.accuracy
+    rungs = quality.rungs(TIERS, SEEING)
+
+    def solve(chosen: IntArray, tier: str) -> tuple[Sight, IntArray]:
+        return sight(world, chosen, frustum, tier, counts), chosen
+
+    found = climb(rows, rungs, solve, lambda sights, _: sights.certain, quality)
+    boxed = sorted({kind for sights in found.answers for kind in sights.boxed})
+    return Sight(found.column("state"), found.column("certain"), boxed), found.count_tiers(counts)
 
 
 def _by_box(

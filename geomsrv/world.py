@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geomsrv import _core, _validate
-from geomsrv.answers import BoolArray, ByteArray, FloatArray, IntArray, end_to_end
+from geomsrv.answers import BoolArray, ByteArray, FloatArray, IntArray, end_to_end, gather
 from geomsrv.shapes import (
     Box,
     Capsule,
@@ -32,7 +32,7 @@ from geomsrv.shapes import (
     pack,
 )
 
-__all__ = ["ROUNDOFF", "UNDERFLOW", "ShapeRow", "ShapeTable", "World", "gather", "own_numbers", "supported_kinds"]
+__all__ = ["ROUNDOFF", "UNDERFLOW", "ShapeRow", "ShapeTable", "World", "own_numbers", "supported_kinds"]
 
 AnyShape = Shape | Frustum
 
@@ -184,18 +184,6 @@ def _bounds(shape: AnyShape) -> tuple[float, ...]:
 def supported_kinds() -> BoolArray:
     """(k, k) bool: kinds, by their code in a packed table, whose distance the engine answers."""
     return _core.supported_pairs()
-
-
-def gather(vertices: FloatArray, offsets: IntArray, rows: IntArray) -> tuple[FloatArray, IntArray]:
-    """The listed rows of a ragged array, end to end, and their offsets."""
-    if len(rows) == 1:
-        only = vertices[offsets[rows[0]] : offsets[rows[0] + 1]]
-        return only, np.array([0, len(only)])
-    counts = offsets[rows + 1] - offsets[rows]
-    ends = np.concatenate([[0], np.cumsum(counts)])
-    # Position k of the output belongs to the item whose stretch it falls in, and lies as far into it.
-    source = np.arange(ends[-1]) + np.repeat(offsets[rows] - ends[:-1], counts)
-    return vertices[source], ends
 
 
 def _with(values: FloatArray, rows: IntArray, new: FloatArray | float) -> FloatArray:

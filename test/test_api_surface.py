@@ -48,14 +48,15 @@ Segment(a, b)
 Point(p)
 Polygon(vertices)
 Region(outline, holes=())
-cull(frustum, boxes, *, accuracy='float64', certificates=False)
-distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False)
+cull(frustum, boxes, *, accuracy='float64', certificates=False, tolerance=None, time_budget=None)
+distance_to_frustum(frustum, points, *, accuracy='float64', want=('distance',), certificates=False,
+    tolerance=None, time_budget=None)
 first_contact(a, b, velocity_a, velocity_b, *, t_max=inf, accuracy='float64', contact_set=True,
     certificates=False, angular_velocity_a=None, angular_velocity_b=None, center_a=None, center_b=None,
-    tolerance=1e-06)
+    tolerance=None, time_budget=None)
 distance(a, b, poses_ab=None, *, accuracy='float64', want=('distance',),
-    certificates=False)
-intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False)
+    certificates=False, tolerance=None, time_budget=None)
+intersects(a, b, poses_ab=None, *, accuracy='float64', certificates=False, tolerance=None, time_budget=None)
 time_to_collision(footprint, twist, obstacles, *, velocities=None, t_max=inf, tolerance=1e-06)
 verify(answer)
 verify_record(record)

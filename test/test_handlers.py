@@ -101,7 +101,8 @@ def test_distance_by_ids(desk) -> None:
     assert got.normal.tolist() == [-1, 0, 0, 1, 0, 0]
     assert all(low <= 0.5 <= high for low, high in zip(got.lower, got.upper, strict=True))
     assert got.scene_version == desk.engine.scene.version and got.cost.accuracy == "float64"
-    assert list(got.cost.stages) == ["narrow box-sphere"] and got.cost.counts.tolist() == [2]
+    assert list(got.cost.stages) == ["narrow box-sphere", "tier float64"] and got.cost.counts.tolist() == [2, 2]
+    assert got.cost.error_bound == max(np.subtract(got.upper, got.lower))
 
 
 def test_distance_of_one_against_many_and_without_witness(desk) -> None:
@@ -707,13 +708,45 @@ QUERIES = ["Cull", "Distance", "FirstContact", "CullBatch", "DistanceBatch", "Fi
 
 
 @pytest.mark.parametrize("service", QUERIES)
-def test_what_is_not_there_yet_is_named(desk, service) -> None:
-    for fields, text in (
-        ({"tolerance": 1e-3}, "tolerance=0.001 is not available yet"),
-        ({"tolerance": math.nan}, "tolerance=nan is not available yet"),
-    ):
-        got = desk.ask(service, **fields)
-        assert got.status == NOT_AVAILABLE and text in got.message and is_empty(got)
+@pytest.mark.parametrize("field", ["tolerance", "time_budget"])
+def test_bad_limits_are_named(desk, service, field) -> None:
+    for value in (-1e-3, math.nan):
+        got = desk.ask(service, **{field: value})
+        assert got.status == BAD_REQUEST and field in got.message and is_empty(got)
+
+
+def test_a_tolerance_instead_of_a_tier(desk) -> None:
+    """Every service: nothing is wider than what was asked for, and the cost says what it took."""
+    ball, far = shapes(gs.Sphere(1.0)), D([3, 0, 0, 0, 0, 0, 1])
+    pair = {"select": INLINE, "shapes_a": ball, "poses_a": D([0, 0, 0, 0, 0, 0, 1]), "shapes_b": ball, "poses_b": far}
+    got = desk.ask("Distance", **pair, tolerance=1e-9)
+    assert got.status == OK and got.distance.tolist() == pytest.approx([1.0], abs=1e-9)
+    assert got.cost.accuracy == "bound" and got.cost.error_bound <= 1e-9
+    assert dict(zip(got.cost.stages, got.cost.counts, strict=True))["tier bound"] == 1
+    got = desk.ask("Distance", select=ALL, max_distance=math.inf, tolerance=1e-6)
+    assert np.nanmax(np.subtract(got.upper, got.lower)) <= 1e-6 >= got.cost.error_bound
+    swing = {"twists_a": D([0, 0, 0, 0, 0, 1]), "want": ["contact_set"]}
+    bar, post = shapes(gs.Box([1, 0.1, 0.1])), shapes(gs.Box([0.1, 0.1, 0.1]))
+    moving = pair | {"shapes_a": bar, "shapes_b": post, "poses_b": D([0, 0.9, 0, 0, 0, 0, 1])} | swing
+    for tolerance in (1e-2, 1e-9):
+        got = desk.ask("FirstContact", **moving, horizon=4.0, tolerance=tolerance)
+        assert got.item_status.tolist() == [gs.WILL_TOUCH], got
+        assert got.time_upper[0] - got.time_lower[0] <= tolerance and got.cost.error_bound <= tolerance
+    assert got.time_upper[0] - got.time_lower[0] > 0.0
+    got = desk.ask("Cull", select=ALL, view=1, frustum=frustum(VIEW), tolerance=1e-3)
+    assert got.status == OK and got.cost.error_bound == 0.0
+
+
+def test_totals_add_up(desk) -> None:
+    """What queries cost, by service and tier."""
+    for accuracy in ("float64", "exact", "exact"):
+        desk.ask("Distance", select=ALL, max_distance=math.inf, accuracy=accuracy)
+    desk.ask("Cull", select=ALL, view=1, frustum=frustum(VIEW), accuracy="bound")
+    rows = desk.engine.totals.rows
+    assert set(rows) == {("~/distance", "float64"), ("~/distance", "exact"), ("~/cull", "bound")}
+    once, twice = rows["~/distance", "float64"], rows["~/distance", "exact"]
+    assert (once[0], twice[0]) == (1, 2) and twice[1] == 2 * once[1] > 0 and min(once[2], twice[2]) > 0
+    assert rows["~/cull", "bound"][1] == len(desk.engine.scene)
 
 
 # ---------------------------------------------------------------------------------------------------------- tiers

@@ -16,11 +16,10 @@ from oracle.vectors import dot, exact, root_double
 from scene_answers import rows_of, scene_of
 
 import geomsrv as gs
-from geomsrv.answers import ContactStatus
+from geomsrv.answers import ContactStatus, gather
 from geomsrv.narrow_phase import relative_poses
 from geomsrv.pairwise import distance_of_two, listed_distances, listed_first_contacts
 from geomsrv.queries import RUNGS, TIERS
-from geomsrv.world import gather
 
 INF = np.inf
 REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

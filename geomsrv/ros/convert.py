@@ -400,8 +400,9 @@ def polygon_from(message: Any) -> FloatArray:
 # --------------------------------------------------------------------------------------------------------- answers
 
 
-def set_cost(message: Any, cost: Cost) -> None:
+def set_cost(message: Any, cost: Cost, error_bound: float) -> None:
     """Fill a geomsrv/Cost."""
+    message.error_bound = error_bound
     message.elapsed_ns, message.accuracy = cost.elapsed_ns, cost.accuracy
     message.stages = list(cost.counts)
     message.counts = array.array("Q", cost.counts.values())
@@ -431,7 +432,7 @@ def set_distances(message: Any, answer: PairDistances, pair_type: Callable[[], A
         pairs.append(pair)
     message.distances = pairs
     message.scene_version = answer.version
-    set_cost(message.cost, answer.cost)
+    set_cost(message.cost, answer.cost, answer.error_bound)
 
 
 def set_contacts(
@@ -472,7 +473,7 @@ def set_contacts(
     message.contacts = contacts
     message.scene_version, message.checked = pairs.version, answer.checked
     message.horizon, message.margin = answer.horizon, answer.margin
-    set_cost(message.cost, pairs.cost)
+    set_cost(message.cost, pairs.cost, pairs.error_bound)
 
 
 def set_visible(message: Any, answer: SceneCull, frustum: Frustum) -> None:
@@ -482,7 +483,7 @@ def set_visible(message: Any, answer: SceneCull, frustum: Frustum) -> None:
     message.states, message.certain = bytes_(answer.state[seen]), bytes_(answer.certain[seen])
     message.checked, message.scene_version = len(answer.ids), answer.version
     set_frustum(message.frustum, frustum)
-    set_cost(message.cost, answer.cost)
+    set_cost(message.cost, answer.cost, answer.error_bound)
 
 
 _NOWHERE = (math.nan, math.nan, math.nan)

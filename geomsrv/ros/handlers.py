@@ -8,6 +8,7 @@ A handler computes first and fills the response last, so that a refusal never le
 from __future__ import annotations
 
 import functools
+import math
 import time
 import traceback
 from collections import Counter
@@ -18,16 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _validate, queries
-from geomsrv.answers import ContactStatus, Cost, DistanceStatus
+from geomsrv.answers import ContactStatus, Cost, DistanceStatus, gather
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
+from geomsrv.ladder import AUTO, Quality
 from geomsrv.pairwise import Bodies, ListedContacts, distance_of_two, listed_distances, listed_first_contacts, world_of
 from geomsrv.proofs import contact_certificates, cull_certificates, distance_certificates
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
-from geomsrv.visibility import sight
-from geomsrv.world import World, gather
+from geomsrv.visibility import seen
+from geomsrv.world import World
 
 __all__ = ["Handlers"]
 
@@ -177,7 +179,7 @@ class Handlers:
     @_answered()
     def cull(self, request: Any, response: Any) -> None:
         """Cull.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
         self._allowed("cull")
         frustum, scene = self._frustum(request), self.engine.scene
         if request.select == INLINE:
@@ -185,12 +187,12 @@ class Handlers:
             start, counts = time.perf_counter_ns(), Counter[str]()
             world = world_of(_bodies(request.shapes, request.poses, ()))
             rows = np.arange(len(world))
-            state, certain, boxed = sight(world, rows, frustum, accuracy, counts)
+            (state, certain, boxed), tier = seen(world, rows, frustum, Quality.of(**quality), counts)
             message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
-            cost = Cost(time.perf_counter_ns() - start, accuracy, dict(counts))
+            cost = Cost(time.perf_counter_ns() - start, tier, dict(counts))
         elif request.select in (BY_IDS, ALL):
             _unused(request, "shapes", "poses", *(("ids",) if request.select == ALL else ()))
-            answer = scene.cull(frustum, ids=None if request.select == ALL else request.ids, accuracy=accuracy)
+            answer = scene.cull(frustum, ids=None if request.select == ALL else request.ids, **quality)
             state, certain, message, cost = answer.state, answer.certain, answer.message, answer.cost
             ids, world = answer.ids, scene.world
             if request.select == BY_IDS and ids != request.ids:
@@ -202,21 +204,22 @@ class Handlers:
         else:
             raise GeometryError(f"select must be BY_IDS, INLINE or ALL, got {request.select}")
         if request.certificates:
-            response.certificates = list(cull_certificates(world, rows, frustum, accuracy=accuracy))
+            response.certificates = list(cull_certificates(world, rows, frustum, accuracy=_proof_tier(quality)))
         response.message = message
         response.states, response.certain = convert.bytes_(state), convert.bytes_(certain)
-        convert.set_cost(response.cost, cost)
+        convert.set_cost(response.cost, cost, 0.0 if certain.all() else math.inf)
+        self.engine.totals.add("~/cull", cost, len(state))
 
     @_answered()
     def distance(self, request: Any, response: Any) -> None:
         """Distance.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
         self._allowed("distance")
         want = self._want(request, "distance", "witness", "penetration")
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE)
             _listed_only(request)
-            self._all_distances(request, response, want, accuracy)
+            self._all_distances(request, response, want, quality)
             return
         if (
             request.select == INLINE
@@ -224,24 +227,28 @@ class Handlers:
             and not request.certificates
         ):
             _unused(request, *_BY_IDS)
-            if self._distance_of_two(request, response, want, accuracy):
+            if self._distance_of_two(request, response, want, quality):
                 return
         if request.select == BY_IDS and request.ids_a and not request.ids_b:
             _unused(request, *_INLINE)
-            world, pairs, lonely = self._nearest(request.ids_a, accuracy)
+            world, pairs, lonely = self._nearest(request.ids_a, quality["accuracy"])
         else:
             (world, pairs), lonely = self._listed(request), ""
-        answer = listed_distances(world, pairs, want=want, accuracy=accuracy)
+        answer = listed_distances(world, pairs, want=want, **quality)
         self.engine.check(world, pairs, answer)
         if request.certificates:
-            response.certificates = list(distance_certificates(world, pairs, want=want, accuracy=accuracy))
+            tier = _proof_tier(quality)
+            response.certificates = list(distance_certificates(world, pairs, want=want, accuracy=tier))
         if request.select == BY_IDS:
             _set_ids(response, world, pairs)
-        _set_distances(response, answer, want)
+        self._set_distances(response, "~/distance", answer, want)
         _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message, lonely)
 
-    def _distance_of_two(self, request: Any, response: Any, want: tuple[str, ...], accuracy: str) -> bool:
+    def _distance_of_two(self, request: Any, response: Any, want: tuple[str, ...], quality: dict[str, Any]) -> bool:
         """Two bodies, if there is nothing more to say about them than their distance."""
+        if quality["tolerance"] is not None or quality["time_budget"] is not None:
+            return False
+        accuracy = "float64" if quality["accuracy"] == AUTO else quality["accuracy"]
         flat = request.poses_a + request.poses_b
         if len(flat) != 14 or len(request.poses_a) != 7 or self.engine.config.cross_check_mode != "off":
             return False
@@ -251,9 +258,9 @@ class Handlers:
         except GeometryError:
             return False  # for the long way to name the field
         answer = distance_of_two(a, b, poses, penetration="penetration" in want, accuracy=accuracy)
-        if answer is None:
+        if answer is None or (quality["accuracy"] == AUTO and answer.status[0] != DistanceStatus.OK):
             return False
-        _set_distances(response, answer, want)
+        self._set_distances(response, "~/distance", answer, want)
         return True
 
     def _nearest(self, ids: Sequence[str], accuracy: str) -> tuple[World, IntArray, str]:
@@ -269,10 +276,10 @@ class Handlers:
                 lonely.append(f"{name!r} has no object to be compared with")
         return world, _pairs_array(pairs), "; ".join(lonely)
 
-    def _all_distances(self, request: Any, response: Any, want: tuple[str, ...], accuracy: str) -> None:
+    def _all_distances(self, request: Any, response: Any, want: tuple[str, ...], quality: dict[str, Any]) -> None:
         """Every pair within max_distance, nearest first, then those that are unsupported."""
         engine = self.engine
-        near = engine.scene.distances(request.max_distance, want=want, accuracy=accuracy)
+        near = engine.scene.distances(request.max_distance, want=want, **quality)
         if engine.config.cross_check_mode != "off":
             engine.cross_check.submit_scene(engine.scene, near)
         order, missing = np.argsort(near.distance, kind="stable"), near.unsupported
@@ -284,22 +291,27 @@ class Handlers:
         for name in _distance_columns(want):
             column = _extended(getattr(near, name)[order], len(missing), np.nan)
             setattr(response, name, convert.doubles(column))
-        convert.set_cost(response.cost, near.cost)
+        self._set_cost(response, "~/distance", near, len(near))
         response.status, response.message = UNSUPPORTED if missing else OK, near.message
 
     @_answered()
     def first_contact(self, request: Any, response: Any) -> None:
         """FirstContact.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
         self._allowed("first_contact")
         want = self._want(request, "first_contact", "contact_set")
+        contact_set = "contact_set" in want
         answer: PairContacts | ListedContacts
         order: IntArray | None
         if request.select == ALL:
             _unused(request, *_BY_IDS, *_INLINE, "twists_a", "twists_b")
             _listed_only(request)
             answer = self.engine.scene.first_contacts(
-                request.horizon, margin=request.margin, earliest=request.earliest, accuracy=accuracy
+                request.horizon,
+                margin=request.margin,
+                earliest=request.earliest,
+                contact_set=contact_set,
+                **quality,
             )
             order = np.argsort(answer.time, kind="stable")
             response.ids_a = [answer.ids_a[i] for i in order.tolist()]
@@ -311,15 +323,17 @@ class Handlers:
                 raise GeometryError("earliest must be false here: it is for ALL_PAIRS")
             if request.certificates and request.margin != 0.0:
                 raise NotAvailableError("certificates are given for contact, not for coming as near as a margin")
-            answer = listed_first_contacts(world, pairs, request.horizon, margin=request.margin, accuracy=accuracy)
+            answer = listed_first_contacts(
+                world, pairs, request.horizon, margin=request.margin, contact_set=contact_set, **quality
+            )
             order = None  # that of the request
             if request.certificates:
-                lines = contact_certificates(world, pairs, request.horizon, accuracy=accuracy)
+                lines = contact_certificates(world, pairs, request.horizon, accuracy=_proof_tier(quality))
                 response.certificates = list(lines)
             if request.select == BY_IDS:
                 _set_ids(response, world, pairs)
-        _set_first_contacts(response, answer, order, want)
-        if "contact_set" in want:
+        self._set_first_contacts(response, "~/first_contact", answer, order, want)
+        if contact_set:
             ends = answer.part_offsets
             if order is not None:
                 sizes, _ = gather(np.diff(ends), np.searchsorted(ends, answer.point_offsets), order)
@@ -330,7 +344,7 @@ class Handlers:
     @_answered()
     def cull_batch(self, request: Any, response: Any) -> None:
         """CullBatch.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
         self._allowed("cull")
         frustum = convert.frustum_of(request.frustum)
         boxes = Boxes(
@@ -338,22 +352,23 @@ class Handlers:
             convert.rows(request.axes, "axes", 9).reshape(-1, 3, 3),
             convert.rows(request.half_extents, "half_extents", 3),
         )
-        answer = queries.cull(frustum, boxes, accuracy=accuracy, certificates=request.certificates)
+        answer = queries.cull(frustum, boxes, certificates=request.certificates, **quality)
         response.states, response.certain = convert.bytes_(answer.state), convert.bytes_(answer.certain)
         _set_certificates(response, answer)
-        convert.set_cost(response.cost, answer.cost)
+        self._set_cost(response, "~/cull_batch", answer, len(answer.state))
 
     @_answered()
     def distance_batch(self, request: Any, response: Any) -> None:
         """DistanceBatch.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
+        self._allowed("distance")
         want = self._want(request, "distance", "witness", "penetration")
         sides = [
             _side(getattr(request, f"kind_{s}"), getattr(request, f"values_{s}"), getattr(request, f"offsets_{s}"), s)
             for s in "ab"
         ]
         a, b = sides
-        options: dict[str, Any] = {"accuracy": accuracy, "want": want, "certificates": request.certificates}
+        options: dict[str, Any] = {"want": want, "certificates": request.certificates, **quality}
         if isinstance(b, np.ndarray):
             if not isinstance(a, Frustum):
                 raise GeometryError("kind_b POINTS needs kind_a FRUSTUM")
@@ -367,7 +382,7 @@ class Handlers:
             answer = queries.distance(a, b, poses, **options)
         else:
             raise GeometryError("kind_a and kind_b must both be batches, or both be shapes of Shape.msg")
-        _set_distances(response, answer, want)
+        self._set_distances(response, "~/distance_batch", answer, want)
         _set_certificates(response, answer)
         if answer.region is not None:
             response.region = convert.bytes_(answer.region)
@@ -376,7 +391,7 @@ class Handlers:
     @_answered()
     def first_contact_batch(self, request: Any, response: Any) -> None:
         """FirstContactBatch.srv."""
-        accuracy = self._quality(request)
+        quality = self._quality(request)
         self._allowed("first_contact")
         want = self._want(request, "contact_set")
         dimension = request.dimension
@@ -398,21 +413,25 @@ class Handlers:
             b,
             *velocities,
             t_max=request.t_max,
-            accuracy=accuracy,
             contact_set="contact_set" in want,
             certificates=request.certificates,
+            **quality,
         )
-        _set_first_contacts(response, answer, None, want)
+        self._set_first_contacts(response, "~/first_contact_batch", answer, None, want)
         _set_certificates(response, answer)
         _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
 
     # ---------------------------------------------------------------------------------------------------- requests
 
-    def _quality(self, request: Any) -> str:
-        """Tier asked for, by default that of the configuration."""
-        if request.tolerance != 0.0:
-            raise NotAvailableError(f"tolerance={request.tolerance:g} is not available yet; it must be 0")
-        return _validate.accuracy(request.accuracy or self.engine.config.accuracy, queries.TIERS)
+    def _quality(self, request: Any) -> dict[str, Any]:
+        """How good the answer is asked to be, as queries take it; the tier by default that of the configuration."""
+        quality = {
+            "accuracy": request.accuracy or self.engine.config.accuracy,
+            "tolerance": request.tolerance or None,
+            "time_budget": request.time_budget or None,
+        }
+        Quality.of(**quality)
+        return quality
 
     def _allowed(self, *effects: str) -> None:
         """Refuse what the configuration has switched off."""
@@ -469,10 +488,44 @@ class Handlers:
         pairs[:, 0], pairs[:, 1] = a, b
         return world, pairs
 
+    # --------------------------------------------------------------------------------------------------- responses
+
+    def _set_cost(self, response: Any, query: str, answer: Any, items: int) -> None:
+        """What the answer cost, also among the totals."""
+        convert.set_cost(response.cost, answer.cost, answer.error_bound)
+        self.engine.totals.add(query, answer.cost, items)
+
+    def _set_distances(self, response: Any, query: str, answer: Any, want: tuple[str, ...]) -> None:
+        response.item_status = convert.bytes_(answer.status)
+        for name in _distance_columns(want):
+            setattr(response, name, convert.doubles(getattr(answer, name)))
+        self._set_cost(response, query, answer, len(answer.status))
+
+    def _set_first_contacts(
+        self, response: Any, query: str, answer: Any, order: IntArray | None, want: tuple[str, ...]
+    ) -> None:
+        """The answer's rows in the given order, or as they are."""
+        rows: Any = slice(None) if order is None else order
+        response.item_status = convert.bytes_(answer.status[rows])
+        for name in _CONTACT_COLUMNS:
+            setattr(response, name, convert.doubles(getattr(answer, name)[rows]))
+        if "contact_set" in want:
+            points, offsets = answer.points, answer.point_offsets
+            if order is not None:
+                points, offsets = gather(points, offsets, order)
+            response.points, response.point_offsets = convert.doubles(points), convert.uint32s(offsets)
+        self._set_cost(response, query, answer, len(answer.status))
+
 
 _AT_REST = np.zeros((0, 6))
 _BY_IDS = ("ids_a", "ids_b")
 _INLINE = ("shapes_a", "poses_a", "shapes_b", "poses_b")
+
+
+def _proof_tier(quality: dict[str, Any]) -> str:
+    """Tier of certificates: where it is chosen item by item, the one that proves most."""
+    tier: str = quality["accuracy"]
+    return "exact" if Quality.of(**quality).climbs else tier
 
 
 def _unused(request: Any, *names: str) -> None:
@@ -563,30 +616,9 @@ def _set_ids(response: Any, world: World, pairs: IntArray) -> None:
     response.scene_version = world.version
 
 
-def _set_distances(response: Any, answer: Any, want: tuple[str, ...]) -> None:
-    response.item_status = convert.bytes_(answer.status)
-    for name in _distance_columns(want):
-        setattr(response, name, convert.doubles(getattr(answer, name)))
-    convert.set_cost(response.cost, answer.cost)
-
-
 def _set_certificates(response: Any, answer: Any) -> None:
     if answer.certificates is not None:
         response.certificates = list(answer.certificates.lines())
-
-
-def _set_first_contacts(response: Any, answer: Any, order: IntArray | None, want: tuple[str, ...]) -> None:
-    """The answer's rows in the given order, or as they are."""
-    rows: Any = slice(None) if order is None else order
-    response.item_status = convert.bytes_(answer.status[rows])
-    for name in _CONTACT_COLUMNS:
-        setattr(response, name, convert.doubles(getattr(answer, name)[rows]))
-    if "contact_set" in want:
-        points, offsets = answer.points, answer.point_offsets
-        if order is not None:
-            points, offsets = gather(points, offsets, order)
-        response.points, response.point_offsets = convert.doubles(points), convert.uint32s(offsets)
-    convert.set_cost(response.cost, answer.cost)
 
 
 def _set_unsupported(response: Any, items: NDArray[np.bool_], *reasons: str, note: str = "") -> None:

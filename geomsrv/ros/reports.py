@@ -45,6 +45,10 @@ def set_state(message: Any, report: Report) -> None:
     message.scene_plan = engine.scene.plan()
     message.counter_names = list(engine.counters)
     message.counter_values = convert.uint64s(list(engine.counters.values()))
+    costs = engine.totals.rows
+    message.cost_queries, message.cost_tiers = [query for query, _ in costs], [tier for _, tier in costs]
+    for k, name in enumerate(("calls", "items", "ns")):
+        setattr(message, f"cost_{name}", convert.uint64s([row[k] for row in costs.values()]))
     message.input_topics = [record.topic for record in report.inputs]
     message.input_ages = convert.doubles([record.age(report.now) for record in report.inputs])
     message.input_received = convert.uint64s([record.received for record in report.inputs])
