@@ -30,6 +30,7 @@ from geomsrv.answers import (
     gather,
 )
 from geomsrv.errors import NotAvailableError
+from geomsrv.ladder import AUTO
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact, intersects
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneObject, SceneUpdate, Visibility
 from geomsrv.shapes import (
@@ -286,17 +287,18 @@ class Answers(NamedTuple):
 
 
 def answers(query: Callable[..., Any], ask: Ask, read: Callable[[Any], Found], *, by_tolerance: bool = True) -> Answers:
-    """Every tier that there is, of which a query refuses those that it lacks; and tolerances, if it takes one.
+    """Every tier that there is, of which a query refuses those that it lacks, the choice item by item, and tolerances.
 
-    Without `by_tolerance` it takes one, but for other items than these.
+    Without `by_tolerance` there is nothing that a tolerance could be about: the answer is a state.
     """
 
     def way(name: str, family: str, **how: Any) -> Way:
         return Way(name, family, lambda block: Call(partial(ask, block, **how), read))
 
     tiers = tuple(way(tier, TIER, accuracy=tier) for tier in _validate.ACCURACIES)
+    ways = (way(AUTO, TIER, accuracy=AUTO), *tiers)
     takes = by_tolerance and "tolerance" in inspect.signature(query).parameters
-    return Answers((*tiers, *(way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if takes)), tiers[-1])
+    return Answers((*ways, *(way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if takes)), tiers[-1])
 
 
 def on_simpler(
@@ -604,13 +606,14 @@ class Asked:
 
         return Call(run, partial(self.read, crowd))
 
-    def tiers(self) -> tuple[Way, ...]:
-        """Every tier that there is."""
+    def ways(self, *, by_tolerance: bool = True) -> tuple[Way, ...]:
+        """The choice item by item, every tier that there is, and tolerances."""
 
-        def way(tier: str) -> Way:
-            return Way(tier, TIER, lambda crowd: self.call(crowd, accuracy=tier))
+        def way(name: str, family: str, **how: Any) -> Way:
+            return Way(name, family, lambda crowd: self.call(crowd, **how))
 
-        return tuple(map(way, _validate.ACCURACIES))
+        tiers = (way(tier, TIER, accuracy=tier) for tier in (AUTO, *_validate.ACCURACIES))
+        return *tiers, *(way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if by_tolerance)
 
     def on_simpler(self, name: str, change: Callable[[Shape], Shape]) -> Way:
         """Other shapes in place of those of the scene."""
@@ -624,7 +627,7 @@ class Asked:
     @property
     def exact(self) -> Way:
         """The tier that judges the others."""
-        return self.tiers()[-1]
+        return next(way for way in self.ways() if way.name == "exact")
 
 
 def _of_pairs(crowd: Crowd, answer: PairDistances) -> Found:
@@ -715,4 +718,4 @@ def in_scene(asked: Asked) -> tuple[Way, ...]:
     def moved(way: Way) -> Way:
         return Way(way.name, way.family, lambda motion: way.prepare(_crowd_of(motion)))
 
-    return tuple(map(moved, asked.tiers()))
+    return tuple(map(moved, asked.ways()))

@@ -91,7 +91,7 @@ class Quality:
     @classmethod
     def of(cls, accuracy: Any, tolerance: Any = None, time_budget: Any = None) -> Quality:
         """Checked; `GeometryError` names the argument and the fault."""
-        if accuracy != AUTO:
+        if not isinstance(accuracy, str) or accuracy != AUTO:
             _validate.accuracy(accuracy, _validate.ACCURACIES)
         if tolerance is not None:
             tolerance = _validate.scalar(tolerance, "tolerance", positive=True)

@@ -336,12 +336,12 @@ def _answered_pairs() -> Iterable[tuple[str, str, bool]]:
 
 
 # What the engine answers by itself.
-SIGHTS = answers(cull, Sight.ask, read_cull)
+SIGHTS = answers(cull, Sight.ask, read_cull, by_tolerance=False)
 POINTS = answers(distance_to_frustum, Points.ask, read_distances)
 PAIRS = answers(distance, Pair.ask, read_distances)
 BATCHES = answers(distance, Batches.ask, read_distances)
-MEETINGS = answers(intersects, Batches.meet, read_booleans)
-MOTIONS = answers(first_contact, Motion.ask, read_contacts, by_tolerance=False)
+MEETINGS = answers(intersects, Batches.meet, read_booleans, by_tolerance=False)
+MOTIONS = answers(first_contact, Motion.ask, read_contacts)
 TURNING = answers(first_contact, Motion.ask_turning, read_contacts)
 
 FIXED_STEPS = tuple(map(fixed_step, STEPS_S))
@@ -384,9 +384,9 @@ QUERIES: tuple[Query, ...] = (
     Query("scene step, first contact 2D, turning", "Scene.first_contacts", "s", partial(_motions, 2, True), 200,
           (*in_scene(MOVED_PAIRS), *FIXED_STEPS), (SEARCHED,)),
     Query("scene step, distances", "Scene.distances", "m", _crowds, 300,
-          (*NEAR_PAIRS.tiers(), NEAR_PAIRS.on_simpler("bounding ball", balled)), (NEAR_PAIRS.exact, ALL_PAIRS)),
+          (*NEAR_PAIRS.ways(), NEAR_PAIRS.on_simpler("bounding ball", balled)), (NEAR_PAIRS.exact, ALL_PAIRS)),
     Query("scene step, cull", "Scene.cull", "", _crowds, 300,
-          (*SEEN.tiers(), SEEN.on_simpler("bounding ball", balled)), (SEEN.exact, BOXES_SEEN)),
+          (*SEEN.ways(by_tolerance=False), SEEN.on_simpler("bounding ball", balled)), (SEEN.exact, BOXES_SEEN)),
 )  # fmt: skip
 
 

@@ -124,10 +124,10 @@ def climbed_contact_rows(
     began = time.perf_counter()
     for chosen, available, ladder in (
         (stepwise, ("float64",), ("float64",)),
-        (~stepwise & planar, TIERS, MOVING_POLYGONS),
         (~stepwise & ~planar, SOLID_MOTION_TIERS, MOVING),
+        (~stepwise & planar, TIERS, MOVING_POLYGONS),
     ):
-        if not chosen.any() and (parts or chosen is stepwise):
+        if not chosen.any() and (parts or planar.any() or chosen is stepwise):
             continue
         left = max(quality.time_budget - (time.perf_counter() - began), 0.0)
         here = replace(quality, time_budget=left)

@@ -241,7 +241,7 @@ def test_changes_are_validated_and_take_effect(client) -> None:
             ("max_rate", 5, "type"),
             ("max_rate", float("nan"), "max_rate"),
             ("cross_check.mode", "sometimes", "one of off, sample, all"),
-            ("accuracy", "great", "one of bound, float32, float64, exact"),
+            ("accuracy", "great", "one of auto, bound, float32, float64, exact"),
             ("camera.far", 0.05, "camera.far must be > camera.near"),
             ("camera.pose", [0.0] * 6, "7 numbers"),
             ("camera.pose", [0.0] * 7, "norm 1"),

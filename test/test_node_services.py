@@ -261,6 +261,6 @@ def test_a_million_first_contacts(client) -> None:
     assert len(got.time) == MILLION and len(got.normal) == 2 * MILLION
     some = slice(0, 1000)
     moved = gs.Polygons(np.reshape(triangle + places[some], (-1, 2)), np.arange(1001) * 3)
-    want = gs.first_contact(gs.Polygons(triangle, [0, 3]), moved, (0, 0), velocities[some])
+    want = gs.first_contact(gs.Polygons(triangle, [0, 3]), moved, (0, 0), velocities[some], accuracy="auto")
     assert np.array_equal(np.asarray(got.time)[some], want.time, equal_nan=True)
     assert {0, 1} <= set(got.item_status)
