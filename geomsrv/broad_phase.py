@@ -8,6 +8,7 @@ Every box holds its object for certain, rounding included; so a pair whose boxes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,17 @@ from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
 from geomsrv.world import ROUNDOFF, UNDERFLOW, World
 
-__all__ = ["Aabbs", "Candidates", "Selection", "boxes_now", "boxes_swept", "candidates", "entry_times", "gaps"]
+__all__ = [
+    "Aabbs",
+    "Candidates",
+    "Selection",
+    "boxes_now",
+    "boxes_swept",
+    "candidates",
+    "candidates_of",
+    "entry_times",
+    "gaps",
+]
 
 # A face of a box is computed as ((R c) + p) +- ((|R| h) + round): a sum of at most six terms, each a product
 # of a rounded and a given number.  With the rounding of c and h themselves (2 u) its error stays below 8 u
@@ -48,6 +59,12 @@ class Aabbs:
         """The listed boxes."""
         return Aabbs(self.lower[rows], self.upper[rows])
 
+    def with_rows(self, rows: IntArray, others: Aabbs) -> Aabbs:
+        """The listed boxes replaced."""
+        lower, upper = self.lower.copy(), self.upper.copy()
+        lower[rows], upper[rows] = others.lower, others.upper
+        return Aabbs(lower, upper)
+
 
 @dataclass(frozen=True, eq=False)
 class Selection:
@@ -74,23 +91,28 @@ class Candidates:
     allowed: int  #: of these, pairs that are ignored
 
 
-def boxes_now(world: World) -> Aabbs:
-    """Boxes around every object where it is now, grown by its uncertainty."""
-    table, rows = world.table, world.shape
+def boxes_now(world: World, rows: IntArray | None = None) -> Aabbs:
+    """Boxes around every object, or the listed ones, where it is now, grown by its uncertainty."""
+    table, shape = world.table, _some(world.shape, rows)
     lower, upper = _core.bounding_boxes(
-        world.poses,
-        world.rotations,
-        world.uncertainty,
-        rows,
+        _some(world.poses, rows),
+        world.rotations if rows is None else world.rotations_of(rows),
+        _some(world.uncertainty, rows),
+        shape,
         table.center,
         table.half,
         table.round,
         AABB_ROUNDING,
         UNDERFLOW,
     )
-    for i in np.flatnonzero(table.unbounded[rows]):
-        lower[i], upper[i] = _half_space_box(world, int(i))
+    for i in np.flatnonzero(table.unbounded[shape]).tolist():
+        lower[i], upper[i] = _half_space_box(world, i if rows is None else int(rows[i]))
     return Aabbs(lower, upper)
+
+
+def _some(column: Any, rows: IntArray | None) -> Any:
+    """The listed rows of a column, or all."""
+    return column if rows is None else column[rows]
 
 
 def _half_space_box(world: World, row: int) -> tuple[FloatArray, FloatArray]:
@@ -113,28 +135,29 @@ def _half_space_box(world: World, row: int) -> tuple[FloatArray, FloatArray]:
     return lower, upper
 
 
-def boxes_swept(world: World, horizon: float) -> Aabbs:
-    """Boxes around all that every object passes through within the next `horizon` seconds."""
-    return _swept(world, horizon) if horizon > 0.0 else boxes_now(world)
+def boxes_swept(world: World, horizon: float, rows: IntArray | None = None) -> Aabbs:
+    """Boxes around all that every object, or each of the listed ones, passes through within `horizon` seconds."""
+    return _swept(world, horizon, rows) if horizon > 0.0 else boxes_now(world, rows)
 
 
-def _swept(world: World, horizon: float) -> Aabbs:
+def _swept(world: World, horizon: float, rows: IntArray | None = None) -> Aabbs:
     """The same; for no time at all boxes that hold an object however it is turned."""
-    now = boxes_now(world)
+    now = boxes_now(world, rows)
     # However an object turns about its origin, it stays in the ball around it.
-    reach = world.table.reach[world.shape] + world.uncertainty
+    reach = world.table.reach[_some(world.shape, rows)] + _some(world.uncertainty, rows)
     lower, upper = _core.swept_boxes(
         now.lower,
         now.upper,
-        world.poses,
-        world.twists,
-        world.turns,
+        _some(world.poses, rows),
+        _some(world.twists, rows),
+        _some(world.turns, rows),
         reach,
-        world.velocity_uncertainty,
+        _some(world.velocity_uncertainty, rows),
         horizon,
         AABB_ROUNDING,
     )
-    lost = list(world.motion_faults)
+    lost = np.array(list(world.motion_faults), dtype=np.int64)
+    lost = lost if rows is None else np.flatnonzero(np.isin(rows, lost))
     lower[lost], upper[lost] = -np.inf, np.inf
     return Aabbs(lower, upper)
 
@@ -176,6 +199,36 @@ def candidates(
         pairs = family[_core.overlapping_pairs(near.lower, near.upper)]
     else:
         pairs = _selected(family, grown, selection)
+    return _allowed_out(world, pairs, boxes, margin)
+
+
+FEW = 16  # objects whose boxes are compared with all others one by one, faster than sorting them
+
+
+def candidates_of(world: World, boxes: Aabbs, margin: float, chosen: IntArray) -> Candidates:
+    """The same for pairs of either family with one of the chosen objects, of which there are few."""
+    if len(chosen) > FEW:
+        first = np.zeros(len(world), dtype=bool)
+        first[chosen] = True
+        selection = Selection(first, np.ones_like(first))
+        parts = [candidates(world, family, boxes, margin, selection) for family in world.families]
+        pairs = np.concatenate([part.pairs for part in parts])
+        return Candidates(pairs, sum(part.found for part in parts), sum(part.allowed for part in parts))
+    own = boxes.rows(chosen)
+    own = own.grown(margin) if margin > 0.0 else own
+    found = []
+    for i, low, high in zip(chosen.tolist(), own.lower.tolist(), own.upper.tolist(), strict=True):
+        others = np.flatnonzero((boxes.lower[:, 0] <= high[0]) & (boxes.upper[:, 0] >= low[0]))
+        for k in (1, 2):
+            others = others[(boxes.lower[others, k] <= high[k]) & (boxes.upper[others, k] >= low[k])]
+        others = others[(world.planar[others] == world.planar[i]) & (others != i)]
+        found.append(np.minimum(others, i) * len(world) + np.maximum(others, i))
+    keys = np.unique(np.concatenate(found))
+    return _allowed_out(world, np.column_stack(np.divmod(keys, len(world))), boxes, margin)
+
+
+def _allowed_out(world: World, pairs: IntArray, boxes: Aabbs, margin: float) -> Candidates:
+    """The pairs whose boxes are within the margin, not only within boxes that were grown by it, and not ignored."""
     if 0.0 < margin < np.inf:
         # Boxes grown by half the margin meet at a corner although they are up to sqrt(3) margins apart.
         pairs = pairs[gaps(boxes, pairs) <= margin * margin * (1.0 + GAP_ROUNDING)]

@@ -241,6 +241,8 @@ def climb(
     solve: Callable[[NDArray[Any], str], tuple[Any, NDArray[Any]]],
     settled: Callable[[Any, str], BoolArray],
     quality: Quality,
+    *,
+    tried: Sequence[str] = TRIED,
 ) -> Climb:
     """Answer items at the first of the `rungs`, those that it does not settle at the next, and so on.
 
@@ -255,6 +257,9 @@ def climb(
     settled : callable
         ``settled(answer, tier)``: (m,) bool, rows that need no higher tier.
     quality : Quality
+    tried : sequence of str
+        Tiers of which a few items are to show whether they are worth a pass: what answers an item then depends on the
+        others.
     """
     deadline = time.perf_counter() + quality.time_budget
     answers: list[Any] = []
@@ -265,7 +270,7 @@ def climb(
     for level, tier in enumerate(rungs):
         last, first = level == len(rungs) - 1, level == 0
         still: list[tuple[NDArray[Any], IntArray]] = []
-        for chunk in _chunks(len(left), deadline, whole=last or tier not in TRIED, all_of_it=first):
+        for chunk in _chunks(len(left), deadline, whole=last or tier not in tried, all_of_it=first):
             if chunk.stop is None:  # out of time: these keep what they have
                 kept.append((left[chunk], rows[chunk], False))
                 break
@@ -281,7 +286,8 @@ def climb(
                 kept.append((*open_ones, False))
             else:
                 still.append(open_ones)
-                if chunk.start == 0 and chunk.stop == TRIAL and not (first and quality.time_budget < math.inf):
+                trial = tier in tried and chunk.start == 0 and chunk.stop == TRIAL
+                if trial and not (first and quality.time_budget < math.inf):
                     if len(answered) and done.mean() < WORTHWHILE:
                         still.append((left[chunk.stop :], rows[chunk.stop :]))
                         break

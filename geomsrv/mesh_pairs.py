@@ -11,7 +11,7 @@ import numpy as np
 
 from geomsrv import _core
 from geomsrv.answers import BoolArray, IntArray
-from geomsrv.narrow_phase import ContactRows, count_kinds, followed_solids, placed, placed_boxes, placed_hulls
+from geomsrv.narrow_phase import ContactRows, count_kinds, placed, placed_boxes, placed_hulls
 from geomsrv.queries import SOLID_MOTION_TIERS, first_contact
 from geomsrv.shapes import Boxes, Mesh, Polytopes
 from geomsrv.world import World
@@ -24,7 +24,7 @@ def sliding_meshes(world: World, pairs: IntArray, horizon: float) -> BoolArray:
     meshes = world.kinds == _core.shape_kinds().index(Mesh.kind)
     if not meshes.any():
         return np.zeros(len(pairs), np.bool_)
-    known = (meshes | followed_solids(world)) & (world.uncertainty == 0.0) & (world.velocity_uncertainty == 0.0)
+    known = (meshes | world.polyhedra) & (world.uncertainty == 0.0) & (world.velocity_uncertainty == 0.0)
     if horizon > 0.0:
         known &= ~world.turns
     sliding: BoolArray = meshes[pairs].any(axis=1) & known[pairs].all(axis=1)

@@ -40,7 +40,6 @@ __all__ = [
     "at_rest",
     "distance_rows",
     "first_contact_rows",
-    "followed_solids",
     "near_at_rest",
     "packed_sets",
     "placed",
@@ -214,7 +213,7 @@ def climbed_distance_rows(
         good: BoolArray = (rows.status == DistanceStatus.OK) & narrow(rows.lower, rows.upper, quality.tolerance)
         return beyond | good
 
-    found = climb(pairs, rungs, solve, settled, quality)
+    found = climb(pairs, rungs, solve, settled, quality, tried=())
     rows = found.rows(DistanceRows)
     rows.status[~found.settled & (rows.status == DistanceStatus.OK)] = DistanceStatus.NOT_CONVERGED
     return rows, Unsupported.joined(missing), found.count_tiers(counts)
@@ -336,7 +335,7 @@ def first_contact_rows(
     turning = np.zeros(len(pairs), dtype=bool)
     if horizon > 0.0 and world.turns.any():
         turning = world.turns[pairs].any(axis=1)
-    moving = ~planar & ~turning & (horizon > 0.0) & followed_solids(world)[pairs].all(axis=1)
+    moving = ~planar & ~turning & (horizon > 0.0) & world.polyhedra[pairs].all(axis=1)
     moving &= world.velocity_uncertainty[pairs].any(axis=1) | _relative_velocity(world, pairs, 3).any(axis=1)
     sliding, spinning, solids = pairs[planar & ~turning], pairs[planar & turning], pairs[~planar & ~moving]
     if (counted := planar | moving).any():
@@ -429,15 +428,6 @@ def polygon_contacts(
     return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets, certain)
 
 
-def followed_solids(world: World) -> BoolArray:
-    """(n,) bool: boxes, and hulls whose vertices are given, which first contact in translation has a kernel for."""
-    kinds, (box, hull) = world.kinds, map(_core.shape_kinds().index, ("box", "convex"))
-    # A frustum is a hull too, but of rounded corners.
-    given = world.table.packed.params[world.shape, 0] == 0.0
-    followed: BoolArray = (kinds == box) | ((kinds == hull) & given)
-    return followed
-
-
 def solid_contacts(
     world: World,
     pairs: IntArray,
@@ -502,7 +492,7 @@ def _side(world: World, rows: IntArray, boxes: bool, shift: FloatArray | None) -
 
 def placed_boxes(world: World, rows: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Centres, axes and half extents of boxes in the fixed frame, literally."""
-    axes = np.ascontiguousarray(world.rotations[rows].swapaxes(1, 2))
+    axes = np.ascontiguousarray(world.rotations_of(rows).swapaxes(1, 2))
     return np.ascontiguousarray(world.poses[rows, :3]), axes, world.table.half[world.shape[rows]]
 
 
@@ -515,7 +505,7 @@ def placed_hulls(world: World, rows: IntArray) -> tuple[FloatArray, IntArray]:
 
 def placed(world: World, rows: IntArray, points: FloatArray) -> FloatArray:
     """Points (k, 3) of the listed objects in the fixed frame, rounded."""
-    turn, (x, y, z) = world.rotations[rows], points.T
+    turn, (x, y, z) = world.rotations_of(rows), points.T
     # Not a matrix product: that may add up in another order for another number of vertices.
     turned = [turn[:, k, 0] * x + turn[:, k, 1] * y + turn[:, k, 2] * z for k in range(3)]
     return np.column_stack(turned) + world.poses[rows, :3]

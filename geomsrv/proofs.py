@@ -15,7 +15,7 @@ import numpy as np
 from geomsrv import _validate
 from geomsrv.answers import Cull, Distances, FirstContacts, IntArray, gather, json_line
 from geomsrv.certificates import without_claim
-from geomsrv.narrow_phase import followed_solids, placed_hulls, relative_poses
+from geomsrv.narrow_phase import placed_hulls, relative_poses
 from geomsrv.queries import cull, distance, first_contact
 from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
 from geomsrv.world import AnyShape, World
@@ -51,7 +51,7 @@ def distance_certificates(world: World, pairs: IntArray, *, want: Sequence[str],
 def contact_certificates(world: World, pairs: IntArray, horizon: float, *, accuracy: str) -> Iterator[str]:
     """A line of JSON for each pair; what is not in translation, exactly known, and has a kernel, claims nothing."""
     _validate.certificates(True, accuracy)
-    vague = ~(world.planar | followed_solids(world))
+    vague = ~(world.planar | world.polyhedra)
     vague |= (world.uncertainty > 0.0) | (world.velocity_uncertainty > 0.0)
     vague |= world.turns & (horizon > 0.0)
     for i, j in pairs.tolist():

@@ -25,13 +25,19 @@ from geomsrv.answers import BoolArray, Bounded, ByteArray, Cost, DistanceStatus,
 from geomsrv.broad_phase import Aabbs, Selection, boxes_now, boxes_swept, candidates
 from geomsrv.errors import GeometryError, SceneError
 from geomsrv.ladder import AUTO, Quality
-from geomsrv.narrow_phase import DistanceRows, Unsupported, climbed_distance_rows, distance_rows, packed_sets
+from geomsrv.memory import Found, Memory
+from geomsrv.narrow_phase import (
+    ContactRows,
+    DistanceRows,
+    Unsupported,
+    climbed_distance_rows,
+    distance_rows,
+)
 from geomsrv.nearest import nearest_rows
 from geomsrv.placement import IDENTITY, in_fixed_frame, laid_flat, numbers, settled
 from geomsrv.scene_plan import describe
 from geomsrv.shapes import Frustum, Polygon, Shape
 from geomsrv.turning_pairs import (
-    Found,
     Question,
     climbed_contact_rows,
     closing_speeds,
@@ -39,7 +45,7 @@ from geomsrv.turning_pairs import (
     first_contact_row,
     nearness,
 )
-from geomsrv.visibility import Visibility, seen
+from geomsrv.visibility import Sight, Visibility, seen
 from geomsrv.world import ShapeTable, World
 
 __all__ = ["PairContacts", "PairDistances", "Scene", "SceneCull", "SceneObject", "SceneUpdate", "Visibility"]
@@ -327,6 +333,8 @@ class Scene:
         )
         self._version = 0
         self._stamp: Any = None
+        self._memory = Memory()
+        self._newest: tuple[Any, ...] = (None, None, None, None)  # the states set last, as they came, and the world
 
     @property
     def world(self) -> World:
@@ -445,7 +453,7 @@ class Scene:
         Returns
         -------
         int
-            The new version.
+            The version after it; the same as before if the very same states were set last.
 
         Raises
         ------
@@ -459,6 +467,12 @@ class Scene:
             rows = self._resolve(ids, world)
             poses = _array(poses, "poses", (len(rows), 7))
             twists = None if twists is None else _array(twists, "twists", (len(rows), 6))
+            if self._repeats(rows, poses, twists, world):
+                self._stamp = stamp if stamp is not None else self._stamp
+                self._world = world.stamped(self._stamp)
+                self._newest = (*self._newest[:3], self._world)
+                return self._version
+            given = poses.copy(), None if twists is None else twists.copy()
             poses, unlike_pose = settled(poses, twists)
             poses, unlike_plane = laid_flat(poses, twists, world.planar[rows])
             if faults := unlike_plane | unlike_pose:
@@ -468,7 +482,16 @@ class Scene:
             self._version += 1
             self._stamp = stamp if stamp is not None else self._stamp
             self._world = world.moved(rows, poses, twists, self._version, self._stamp)
+            self._newest = (rows, *given, self._world)
             return self._version
+
+    def _repeats(self, rows: IntArray, poses: FloatArray, twists: FloatArray | None, world: World) -> bool:
+        """Whether these states are, bit by bit, those that were set last, which is no change."""
+        last_rows, last_poses, last_twists, last_world = self._newest
+        if rows is not last_rows or world is not last_world or (twists is None) != (last_twists is None):
+            return False
+        same = np.array_equal(poses, last_poses) and (twists is None or np.array_equal(twists, last_twists))
+        return bool(same)
 
     def distances(
         self,
@@ -621,14 +644,25 @@ class Scene:
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
-        pairs = _near(world, boxes_swept(world, limit), near, selection, counts)
 
-        def find(pairs: IntArray) -> Found:
+        def follow(pairs: IntArray) -> tuple[ContactRows, Unsupported, str]:
             if quality.climbs:
                 return climbed_contact_rows(world, pairs, question, quality, counts)
             return *contact_rows(world, pairs, question, counts), accuracy
 
-        rows, unsupported, tier = first_contact_row(world, pairs, near, counts, find) if earliest else find(pairs)
+        def find(pairs: IntArray) -> Found:
+            rows, unsupported, tier = (
+                first_contact_row(world, pairs, near, counts, follow) if earliest else follow(pairs)
+            )
+            return Found(rows, closing_speeds(world, rows), unsupported, tier)
+
+        def swept(world: World, rows: IntArray | None) -> Aabbs:
+            return boxes_swept(world, limit, rows)
+
+        # Which pair is first depends on all others: only the same world has the same one.
+        name = ("earliest", world.version) if earliest else "first contacts"
+        found = self._found((name, question, quality), world, swept, near, selection, quality, counts, find)
+        rows, unsupported, tier = found.rows, found.unsupported, found.tier
         counts["unsupported"] += len(unsupported.pairs)
         return PairContacts(
             Cost(time.perf_counter_ns() - start, tier, dict(counts)),
@@ -644,8 +678,8 @@ class Scene:
             rows.upper,
             rows.last_time,
             rows.normal,
-            closing_speeds(world, rows),
-            *packed_sets(rows.points),
+            found.speed,
+            *found.sets,
         )
 
     def cull(
@@ -688,10 +722,19 @@ class Scene:
         world = self.world
         rows = np.arange(len(world)) if ids is None else np.flatnonzero(_members(world, ids, "ids"))
         counts: Counter[str] = Counter(objects=len(rows))
-        (state, certain, boxed), tier = seen(world, rows, frustum, quality, counts)
+
+        def look(rows: IntArray) -> tuple[Sight, str]:
+            return seen(world, rows, frustum, quality, counts)
+
+        if ids is None and quality.time_budget == np.inf:
+            question = ("cull", frustum.packed().tobytes(), quality)
+            (state, certain, boxed), tier = self._memory.objects(question, world, counts, look)
+            state, certain = state.copy(), certain.copy()
+        else:
+            (state, certain, boxed), tier = look(rows)
         message = f"judged by their bounding box: {', '.join(boxed)}" if boxed else ""
         return SceneCull(
-            [world.ids[k] for k in rows.tolist()],
+            list(world.ids) if ids is None else [world.ids[k] for k in rows.tolist()],
             state,
             certain,
             message,
@@ -802,6 +845,22 @@ class Scene:
         self._resolved = (ids if isinstance(ids, tuple) else names, world.index, rows)
         return rows
 
+    def _found(
+        self,
+        question: Any,
+        world: World,
+        boxes: Callable[[World, IntArray | None], Aabbs],
+        margin: float,
+        selection: Selection | None,
+        quality: Quality,
+        counts: Counter[str],
+        find: Callable[[IntArray], Found],
+    ) -> Found:
+        """What `find` says of the pairs whose boxes are near enough, with what is remembered of an earlier answer."""
+        if selection is not None or quality.time_budget < np.inf:
+            return find(_near(world, boxes(world, None), margin, selection, counts))
+        return self._memory.pairs(question, world, boxes, margin, counts, find)
+
     def _distances(
         self,
         start: int,
@@ -815,17 +874,21 @@ class Scene:
         world = self.world
         selection = _selection(world, ids, others)
         counts = _considered(world, selection)
-        pairs = _near(world, boxes_now(world), limit, selection, counts)
-        tier = quality.accuracy
-        if quality.climbs:
-            rows, unsupported, tier = climbed_distance_rows(
-                world, pairs, penetration, quality, counts, limit, "witness" in want
-            )
-        else:
-            rows, unsupported = distance_rows(world, pairs, penetration, tier, counts)
-        open_ended = (rows.uncertainty > 0.0) | (rows.status == DistanceStatus.NOT_CONVERGED)
-        rows = rows.take((rows.distance <= limit) | (open_ended & (rows.lower <= limit)))
-        return _pair_distances(world, rows, unsupported, start, tier, counts)
+        points = "witness" in want
+
+        def find(pairs: IntArray) -> Found:
+            if quality.climbs:
+                answer = climbed_distance_rows(world, pairs, penetration, quality, counts, limit, points)
+            else:
+                answer = *distance_rows(world, pairs, penetration, quality.accuracy, counts), quality.accuracy
+            rows, unsupported, tier = answer
+            open_ended = (rows.uncertainty > 0.0) | (rows.status == DistanceStatus.NOT_CONVERGED)
+            rows = rows.take((rows.distance <= limit) | (open_ended & (rows.lower <= limit)))
+            return Found(rows, np.zeros(0), unsupported, tier)
+
+        question = ("distances", limit, penetration, points, quality)
+        found = self._found(question, world, boxes_now, limit, selection, quality, counts, find)
+        return _pair_distances(world, found.rows, found.unsupported, start, found.tier, counts)
 
 
 # ---------------------------------------------------------------------------------------------------- the edge
@@ -895,9 +958,10 @@ def _selection(world: World, ids: Iterable[str] | None, others: Iterable[str] | 
 
 def _considered(world: World, selection: Selection | None) -> Counter[str]:
     """Fresh counters: objects, and the pairs the broad phase has to choose from."""
-    everything = Selection(np.ones(len(world), dtype=bool), np.ones(len(world), dtype=bool))
-    asked = selection or everything
-    pairs = sum(asked.pair_count(family) for family in world.families)
+    if selection is None:
+        pairs = sum(len(family) * (len(family) - 1) // 2 for family in world.families)
+    else:
+        pairs = sum(selection.pair_count(family) for family in world.families)
     return Counter({"objects": len(world), "pairs": pairs, "candidates": 0, "allowed": 0})
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomsrv.narrow_phase import followed_solids
 from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.visibility import boxed_kinds
 from geomsrv.world import World, supported_kinds
@@ -46,7 +45,7 @@ def _first_contacts(world: World) -> list[str]:
     if not moving.any():
         return ["first contacts: nothing moves, nothing is swept; pairs are in contact now or never"]
     lines = [f"first contacts: boxes swept for {_count(int(moving.sum()), 'moving object')}"]
-    sliding, known = moving & ~world.turns, followed_solids(world)
+    sliding, known = moving & ~world.turns, world.polyhedra
     followed = [
         _count(int(number), name, plural)
         for number, name, plural in (

@@ -30,7 +30,6 @@ from geomsrv.narrow_phase import (
     at_rest,
     count_kinds,
     first_contact_rows,
-    followed_solids,
     near_at_rest,
     placed_boxes,
     placed_hulls,
@@ -134,7 +133,12 @@ def climbed_contact_rows(
         fixed = quality.accuracy not in (AUTO, "float64")
         rungs = here.rungs(available if not fixed else TIERS, ladder)
         found = climb(
-            pairs[chosen], rungs, partial(_solve, world, question, counts, missing), partial(_settled, here), here
+            pairs[chosen],
+            rungs,
+            partial(_solve, world, question, counts, missing),
+            partial(_settled, here),
+            here,
+            tried=(),
         )
         rows = found.rows(ContactRows)
         vague = ~found.settled & ((rows.status != ContactStatus.TOUCHING) | ~rows.certain)
@@ -174,7 +178,7 @@ def _followed(world: World, pairs: IntArray, question: Question) -> BoolArray:
     nothing = np.zeros(len(pairs), np.bool_)
     if question.tier != "float64" or question.horizon == 0.0:
         return nothing
-    if not world.turns.any() and (world.planar | followed_solids(world)).all():
+    if not world.turns.any() and (world.planar | world.polyhedra).all():
         return nothing
     turns = world.turns[pairs].any(axis=1)
     stepwise = (turns & question.rotation) | (~turns & _rolling(world, pairs))
@@ -272,7 +276,7 @@ def closing_speeds(world: World, rows: ContactRows) -> FloatArray:
 
 def _rolling(world: World, pairs: IntArray) -> BoolArray:
     """(k,) bool: solids of which one is round, at different velocities."""
-    flat = world.planar[pairs[:, 0]] | followed_solids(world)[pairs].all(axis=1)
+    flat = world.planar[pairs[:, 0]] | world.polyhedra[pairs].all(axis=1)
     velocity = world.twists[pairs, :3]
     apart = (velocity[:, 0] != velocity[:, 1]).any(axis=1) | world.velocity_uncertainty[pairs].any(axis=1)
     rolling: BoolArray = ~flat & apart

@@ -91,7 +91,7 @@ def seen(world: World, rows: IntArray, frustum: Frustum, quality: Quality, count
     def solve(chosen: IntArray, tier: str) -> tuple[Sight, IntArray]:
         return sight(world, chosen, frustum, tier, counts), chosen
 
-    found = climb(rows, rungs, solve, lambda sights, _: sights.certain, quality)
+    found = climb(rows, rungs, solve, lambda sights, _: sights.certain, quality, tried=())
     boxed = sorted({kind for sights in found.answers for kind in sights.boxed})
     return Sight(found.column("state"), found.column("certain"), boxed), found.count_tiers(counts)
 
@@ -101,7 +101,7 @@ def _by_box(
 ) -> tuple[ByteArray, BoolArray]:
     """State of an oriented box around every object: boxes as they are, all others rounded up."""
     table, shape = world.table, world.shape[rows]
-    turn = world.rotations[rows]
+    turn = world.rotations_of(rows)
     position = world.poses[rows, :3]
     half = table.half[shape] + table.round[shape][:, None]
     exact = table.boxes[shape]

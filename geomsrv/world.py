@@ -38,6 +38,8 @@ AnyShape = Shape | Frustum
 
 ROUNDOFF = 2.0**-53  #: largest relative error of one float64 operation
 
+HISTORY = 8  #: versions of which a world knows what was moved
+
 # A product below 2^-1022 is rounded to a multiple of 2^-1074, by half a unit; sums are exact down there.  The
 # few products that place an object lose less than this.
 UNDERFLOW = 2.0**-1070
@@ -187,7 +189,9 @@ def supported_kinds() -> BoolArray:
 
 
 def _with(values: FloatArray, rows: IntArray, new: FloatArray | float) -> FloatArray:
-    """A copy with other rows: queries under way keep what they have."""
+    """A copy with other rows, unless these are the same: queries under way keep what they have."""
+    if isinstance(new, np.ndarray) and np.array_equal(values[rows].view(np.int64), new.view(np.int64)):
+        return values
     out = values.copy()
     out[rows] = new
     return out
@@ -215,6 +219,8 @@ class World:
         Sorted keys ``i * n + j``, i < j, of the present pairs that are ignored.
     version : int
     stamp : object
+    history : tuple of (int, (k,) int64)
+        The latest versions that `moved` made, and the rows that it was given for each.
     """
 
     ids: tuple[str, ...]
@@ -229,6 +235,7 @@ class World:
     allowed: IntArray
     version: int
     stamp: Any
+    history: tuple[tuple[int, IntArray], ...] = ()
 
     @classmethod
     def empty(cls) -> World:
@@ -240,20 +247,49 @@ class World:
 
     def moved(self, rows: IntArray, poses: FloatArray, twists: FloatArray | None, version: int, stamp: Any) -> World:
         """The same objects, the listed ones in other states; without `twists` they go on as before."""
-        world = replace(self, poses=_with(self.poses, rows, poses), version=version, stamp=stamp)
+        history = (*self.history[1 - HISTORY :], (version, rows))
+        world = replace(self, poses=_with(self.poses, rows, poses), version=version, stamp=stamp, history=history)
         if twists is not None:
             # What was said about how far the old velocities can be trusted is no longer true.
             world = replace(
                 world,
                 twists=_with(self.twists, rows, twists),
                 velocity_uncertainty=_with(self.velocity_uncertainty, rows, 0.0),
-                motion_faults={row: fault for row, fault in self.motion_faults.items() if row not in rows},
+                motion_faults={row: fault for row, fault in self.motion_faults.items() if row not in rows}
+                if self.motion_faults
+                else self.motion_faults,
             )
-        # What follows from the objects alone has been found out already.
-        for name in ("kinds", "planar", "families"):
-            if name in self.__dict__:
-                world.__dict__[name] = self.__dict__[name]
+        # What follows from the objects alone, or from velocities that are the same, has been found out already.
+        known = ["kinds", "planar", "families", "polyhedra"]
+        if world.twists is self.twists and world.motion_faults is self.motion_faults:
+            known += ["moves", "turns"]
+        world.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
         return world
+
+    def stamped(self, stamp: Any) -> World:
+        """The same version, seen again at another time."""
+        world = object.__new__(World)
+        world.__dict__.update(self.__dict__, stamp=stamp)
+        return world
+
+    def changed_since(self, old: World) -> BoolArray | None:
+        """(n,) bool: objects whose state differs; None if they are not the same objects, or pairs."""
+        for name in ("ids", "table", "shape", "allowed", "uncertainty"):
+            if getattr(self, name) is not getattr(old, name):
+                return None
+        changed = np.zeros(len(self), dtype=bool)
+        since = [rows for version, rows in self.history if version > old.version]
+        known = len(since) == self.version - old.version and sum(map(len, since)) < len(self)
+        rows: Any = np.concatenate([np.zeros(0, np.int64), *since]) if known else slice(None)
+        for name in ("poses", "twists", "velocity_uncertainty"):
+            mine, theirs = getattr(self, name), getattr(old, name)
+            if mine is not theirs:
+                differs = mine[rows].view(np.int64) != theirs[rows].view(np.int64)  # 0 and -0 differ in what follows
+                changed[rows] |= differs if differs.ndim == 1 else differs.any(axis=1)
+        if self.motion_faults is not old.motion_faults:
+            both = self.motion_faults.keys() | old.motion_faults.keys()
+            changed[[row for row in both if self.motion_faults.get(row) != old.motion_faults.get(row)]] = True
+        return changed
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -262,6 +298,12 @@ class World:
     def rotations(self) -> FloatArray:
         """(n, 3, 3) float64, v_fixed = R v_body: computed once and from then on taken literally."""
         return _validate.rotation_matrices(self.poses[:, 3:])
+
+    def rotations_of(self, rows: IntArray) -> FloatArray:
+        """(k, 3, 3) those of the listed objects; of a few of many they are computed alone, to the same bits."""
+        if "rotations" in self.__dict__ or 4 * len(rows) > len(self):
+            return self.rotations[rows]
+        return _validate.rotation_matrices(self.poses[rows, 3:])
 
     @cached_property
     def kinds(self) -> ByteArray:
@@ -277,6 +319,14 @@ class World:
     def families(self) -> tuple[IntArray, IntArray]:
         """Rows of the solids and rows of the polygons: only members of one family are compared."""
         return np.flatnonzero(~self.planar), np.flatnonzero(self.planar)
+
+    @cached_property
+    def polyhedra(self) -> BoolArray:
+        """(n,) bool: boxes, and hulls whose vertices are given; a frustum is a hull, too, but of rounded corners."""
+        box, hull = map(_core.shape_kinds().index, ("box", "convex"))
+        given = self.table.packed.params[self.shape, 0] == 0.0
+        found: BoolArray = (self.kinds == box) | ((self.kinds == hull) & given)
+        return found
 
     @cached_property
     def moves(self) -> BoolArray:
