@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
-from geomsrv import _validate
+from geomsrv import _validate, effects
 from geomsrv.errors import GeometryError
 from geomsrv.ladder import AUTO
 
@@ -76,6 +76,14 @@ def _setting(default: Any, name: str, description: str, **limits: Any) -> Any:
     return field(default=default, metadata={"setting": Setting(name, description, **limits)})
 
 
+SWITCH = (effects.AUTO, effects.ON, effects.OFF)
+
+
+def _switch(effect: str, description: str) -> Any:
+    """The parameter of an effect."""
+    return _setting(effects.AUTO, f"effects.{effect}", description, choices=SWITCH)
+
+
 @dataclass(frozen=True)
 class Config:
     """Values of all parameters.
@@ -130,17 +138,22 @@ class Config:
         minimum=0.01,
         maximum=3600.0,
     )
-    effects_cull: bool = _setting(True, "effects.cull", "Allow culling: ~/visible and ~/cull.")
-    effects_distance: bool = _setting(True, "effects.distance", "Allow distances: ~/distances and ~/distance.")
-    effects_witness: bool = _setting(True, "effects.witness", "Allow nearest points and normals of distances.")
-    effects_penetration: bool = _setting(True, "effects.penetration", "Allow penetration depths of overlapping bodies.")
-    effects_first_contact: bool = _setting(
-        True,
-        "effects.first_contact",
-        "Allow looking ahead; without it ~/contacts lists what touches now and ~/first_contact answers NOT_AVAILABLE.",
+    effects_cull: str = _switch("cull", "Culling: ~/visible and ~/cull.")
+    effects_distance: str = _switch("distance", "Distances: ~/distances and ~/distance.")
+    effects_witness: str = _switch("witness", "Nearest points and normals of distances.")
+    effects_penetration: str = _switch("penetration", "Penetration depths of overlapping bodies.")
+    effects_first_contact: str = _switch(
+        "first_contact",
+        "Looking ahead; without it ~/contacts lists what touches now and ~/first_contact answers NOT_AVAILABLE.",
     )
-    effects_contact_set: bool = _setting(True, "effects.contact_set", "Allow the points of contact.")
-    effects_markers: bool = _setting(True, "effects.markers", "Publish ~/markers.")
+    effects_rotation: str = _switch(
+        "rotation", "Following what turns; without it that is UNSUPPORTED unless it is in contact now."
+    )
+    effects_contact_set: str = _switch("contact_set", "The points of contact.")
+    effects_cross_check: str = _switch(
+        "cross_check", "The second opinion by FCL: as cross_check.mode says, or, switched on, of all if that is off."
+    )
+    effects_markers: str = _switch("markers", "~/markers.")
     contacts_margin: float = _setting(
         0.0,
         "contacts.margin",
@@ -211,15 +224,23 @@ class Config:
         unknown = sorted(set(values) - set(names))
         if unknown:
             raise GeometryError(f"{unknown[0]} is no parameter")
-        return replace(self, **{names[name]: _plain(value) for name, value in values.items()})
+        choices = {setting.name: setting.choices for setting in settings()}
+        return replace(self, **{names[name]: _plain(value, choices[name]) for name, value in values.items()})
+
+    @property
+    def modes(self) -> dict[str, str]:
+        """`effects.*` by the effect's name."""
+        return {name.partition(".")[2]: value for name, value in self.by_name().items() if name.startswith("effects.")}
 
     def by_name(self) -> dict[str, Any]:
         """Values by parameter name, in the order of declaration."""
         return {setting.name: getattr(self, item.name) for setting, item in zip(settings(), fields(self), strict=True)}
 
 
-def _plain(value: Any) -> Any:
-    """Lists of any kind as a tuple, so that a `Config` stays hashable."""
+def _plain(value: Any, choices: tuple[str, ...]) -> Any:
+    """Lists of any kind as a tuple, so that a `Config` stays hashable; `on` and `off`, which YAML reads as booleans."""
+    if isinstance(value, bool) and effects.OFF in choices:
+        return effects.ON if value else effects.OFF
     return tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 
 

@@ -19,28 +19,17 @@ from numpy.typing import ArrayLike, NDArray
 from geomsrv.answers import Cost
 from geomsrv.config import Config
 from geomsrv.crosscheck import CrossCheck
-from geomsrv.ladder import AUTO
+from geomsrv.effects import CONTACTS, DISTANCES, OFF, ON, VISIBLE, Situation, Stage, plan
 from geomsrv.pairwise import ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
 from geomsrv.turning_pairs import followed_in_turning
 from geomsrv.world import World
 
-__all__ = ["Engine", "Evaluation", "SceneContacts", "Stage", "Totals"]
+__all__ = ["Engine", "Evaluation", "SceneContacts", "Totals"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-CONTACTS, DISTANCES, VISIBLE, MARKERS = "contacts", "distances", "visible", "markers"  #: what can be asked for
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One line of the plan: an effect, whether it runs, and why."""
-
-    name: str
-    active: bool
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,61 +159,14 @@ class Engine:
         Parameters
         ----------
         asked : frozenset of str
-            Topics that somebody listens to: `CONTACTS`, `DISTANCES`, `VISIBLE`, `MARKERS`.
+            Topics that somebody listens to: those of `geomsrv.effects`.
         """
-        config = self.config
-        cull = (
-            (not config.effects_cull, "switched off by effects.cull"),
-            (VISIBLE not in asked, "nobody listens to ~/visible"),
-            (self.camera is None, "no ~/camera_info yet"),
+        config, check = self.config, self.cross_check
+        off = "cross_check.mode is off" if check.mode == "off" else "" if check.available else check.reason
+        now = Situation(
+            config.accuracy, config.horizon, self.camera is not None, self.moving_count, self.turning_count, off
         )
-        distance = (
-            (not config.effects_distance, "switched off by effects.distance"),
-            (DISTANCES not in asked, "nobody listens to ~/distances"),
-        )
-        # A drawing shows contacts, so it asks for them too.
-        contact = ((not asked & {CONTACTS, MARKERS}, "nobody listens to ~/contacts"),)
-        return [
-            _stage("cull", *cull),
-            _stage("distance", *distance),
-            _stage("witness", *distance, (not config.effects_witness, "switched off by effects.witness")),
-            _stage("contact", *contact),
-            _stage(
-                "first_contact",
-                *contact,
-                (not config.effects_first_contact, "switched off by effects.first_contact"),
-                (config.horizon == 0.0, "the horizon is 0"),
-                (self.moving_count == 0, "nothing moves"),
-            ),
-            _stage(
-                "rotation",
-                *contact,
-                (not config.effects_first_contact, "switched off by effects.first_contact"),
-                (config.horizon == 0.0, "the horizon is 0"),
-                (self.turning_count == 0, "nothing turns"),
-                (
-                    config.accuracy not in (AUTO, "float64"),
-                    f"turning objects are followed at float64, not at {config.accuracy}",
-                ),
-            ),
-            _stage("contact_set", *contact, (not config.effects_contact_set, "switched off by effects.contact_set")),
-            _stage(
-                "penetration",
-                (not asked & {CONTACTS, DISTANCES, MARKERS}, "nobody listens to ~/contacts or ~/distances"),
-                (not config.effects_penetration, "switched off by effects.penetration"),
-            ),
-            _stage(
-                "cross_check",
-                (config.cross_check_mode == "off", "cross_check.mode is off"),
-                (not self.cross_check.available, self.cross_check.reason),
-                *distance,
-            ),
-            _stage(
-                "markers",
-                (not config.effects_markers, "switched off by effects.markers"),
-                (MARKERS not in asked, "nobody listens to ~/markers"),
-            ),
-        ]
+        return plan(asked, config.modes, now)
 
     # -------------------------------------------------------------------------------------------------- evaluation
 
@@ -276,15 +218,19 @@ class Engine:
     def _contacts(self, on: frozenset[str]) -> SceneContacts:
         self.counters["contact"] += 1
         # If nothing moves the scene sweeps nothing, and the present holds until the horizon.
-        horizon = self.config.horizon if self.config.effects_first_contact else 0.0
+        horizon = self.config.horizon if self.config.effects_first_contact != OFF else 0.0
         self.counters["first_contact"] += "first_contact" in on
         self.counters["rotation"] += "rotation" in on
+        self.counters["contact_set"] += "contact_set" in on
         margin, earliest = self.config.contacts_margin, self.config.contacts_earliest
-        pairs = self.scene.first_contacts(horizon, margin=margin, earliest=earliest, accuracy=self.config.accuracy)
-        if "contact_set" in on:
-            self.counters["contact_set"] += 1
-        else:
-            pairs = replace(pairs, points=np.zeros((0, 3)), point_offsets=np.zeros(len(pairs) + 1, np.int64))
+        pairs = self.scene.first_contacts(
+            horizon,
+            margin=margin,
+            earliest=earliest,
+            accuracy=self.config.accuracy,
+            contact_set="contact_set" in on,
+            rotation=self.config.effects_rotation != OFF,
+        )
         depth = np.full(len(pairs), np.nan)
         if "penetration" in on and (pairs.time == 0.0).any():
             self.counters["penetration"] += 1
@@ -295,17 +241,9 @@ class Engine:
 
     def check(self, world: World, pairs: IntArray, answer: PairDistances | ListedDistances) -> None:
         """Hand distances of (n, 2) rows of `world` to the cross-check, if it is on."""
-        if self.config.cross_check_mode != "off":
+        if self.cross_check.mode != "off":
             self.counters["cross_check"] += 1
             self.cross_check.submit_pairs(world, pairs, answer)
-
-
-def _stage(name: str, *obstacles: tuple[bool, str]) -> Stage:
-    """A stage runs unless something is in its way; the first of that is the reason."""
-    for is_there, reason in obstacles:
-        if is_there:
-            return Stage(name, False, reason)
-    return Stage(name, True, "asked for")
 
 
 def _depths(pairs: PairContacts, now: PairDistances) -> FloatArray:
@@ -315,7 +253,10 @@ def _depths(pairs: PairContacts, now: PairDistances) -> FloatArray:
 
 
 def _cross_check_settings(config: Config) -> tuple[str, float, float]:
-    return config.cross_check_mode, config.cross_check_sample_fraction, config.cross_check_timeout
+    mode = config.cross_check_mode
+    if config.effects_cross_check == OFF or (config.effects_cross_check == ON and mode == "off"):
+        mode = "off" if config.effects_cross_check == OFF else "all"
+    return mode, config.cross_check_sample_fraction, config.cross_check_timeout
 
 
 def _cross_check(config: Config) -> CrossCheck:

@@ -60,7 +60,7 @@ def _first_contacts(world: World) -> list[str]:
     if turning := int((world.turns & spinning).sum()):
         lines.append(f"- followed while they turn, at tier float64: {_count(turning, 'object')}")
     elif not world.turns.any():
-        lines.append("- rotation: skipped, nothing turns")
+        lines.append("- rotation: skipped, no shape has angular velocity")
     if rolling := int((sliding & spinning & ~known)[solids].sum()):
         lines.append(
             f"- followed step by step, at tier float64: {_count(rolling, 'sphere or capsule', 'spheres and capsules')}"

@@ -51,6 +51,7 @@ __all__ = [
 # The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
 CAPSULE_ROUNDING = 16.0 * ROUNDOFF
 
+SWITCHED_OFF = "first contact of what turns is switched off"
 NO_APPROACH = "first contact at a distance ({}) is unsupported"
 
 FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, beside polygons
@@ -107,6 +108,11 @@ def contact_rows(
             rows = ContactRows.joined([_turning_contacts(world, pairs[followed], question), rows])
     if not question.contact_set:
         rows.points[:] = None
+    if not question.rotation and len(unsupported.pairs):
+        spared = (world.turns[unsupported.pairs].any(axis=1)) & followed_in_turning(world)[unsupported.pairs].all(
+            axis=1
+        )
+        unsupported.reason[spared] = SWITCHED_OFF
     return rows, unsupported
 
 

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 import geomsrv as gs
 from geomsrv.config import Config
-from geomsrv.engine import CONTACTS, DISTANCES, MARKERS, VISIBLE, Engine
+from geomsrv.effects import CONTACTS, DISTANCES, EFFECTS, MARKERS, VISIBLE
+from geomsrv.engine import Engine
 from geomsrv.queries import TIERS
 
 EVERYTHING = frozenset({CONTACTS, DISTANCES, VISIBLE, MARKERS})
@@ -99,7 +102,7 @@ def test_what_does_not_move_is_not_swept() -> None:
 def test_what_does_not_turn_is_not_followed_in_turning() -> None:
     engine = make()
     (stage,) = [stage for stage in engine.plan(EVERYTHING) if stage.name == "rotation"]
-    assert (stage.active, stage.reason) == (False, "nothing turns")
+    assert (stage.active, stage.reason) == (False, "no shape has angular velocity")
     engine.evaluate(EVERYTHING)
     assert engine.counters["rotation"] == 0 < engine.counters["first_contact"]
     spin = gs.SceneObject("spin", gs.Box((2.0, 0.1, 0.1)), (0, 0, 9, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1))
@@ -119,39 +122,6 @@ def test_no_camera_no_culling() -> None:
     (stage,) = [stage for stage in engine.plan(EVERYTHING) if stage.name == "cull"]
     assert (stage.active, stage.reason) == (False, "no ~/camera_info yet")
     assert engine.evaluate(EVERYTHING).visible is None
-
-
-FIELDS = ("distance", "lower", "upper", "status")
-
-
-@pytest.mark.parametrize(
-    "effect", ["cull", "distance", "witness", "penetration", "first_contact", "contact_set", "markers"]
-)
-def test_switching_one_effect_off_leaves_the_rest_bit_identical(effect) -> None:
-    full, less = make(), make(**{effect: False})
-    whole, rest = full.evaluate(EVERYTHING), less.evaluate(EVERYTHING)
-    assert effect not in active(less) and less.counters[effect] == 0
-    if effect != "cull":
-        assert np.array_equal(whole.visible.state, rest.visible.state)
-    if effect == "distance":
-        assert rest.distances is None
-    elif effect == "penetration":
-        apart = whole.distances.distance > 0
-        assert apart.any() and np.array_equal(whole.distances.distance[apart], rest.distances.distance[apart])
-        assert np.isnan(rest.contacts.depth).all()
-    else:
-        for name in FIELDS:
-            assert np.array_equal(getattr(whole.distances, name), getattr(rest.distances, name)), name
-        same = np.array_equal(whole.distances.point_a, rest.distances.point_a)
-        assert same == (effect != "witness")
-    if effect == "contact_set":
-        assert len(rest.contacts.pairs.points) == 0 < len(whole.contacts.pairs.points)
-    if effect == "first_contact":
-        assert rest.contacts.horizon == 0.0 and rest.contacts.pairs.ids_a == ["ball"]
-    else:
-        for name in ("status", "time", "time_lower", "time_upper", "last_time", "normal"):
-            one, other = getattr(whole.contacts.pairs, name), getattr(rest.contacts.pairs, name)
-            assert np.array_equal(one, other, equal_nan=True), name
 
 
 def test_reconfiguring_replaces_the_cross_check_only_when_it_changes() -> None:
@@ -193,3 +163,104 @@ def test_every_topic_is_answered_at_the_tier_of_the_configuration(tier) -> None:
     assert near >= {("ball", "box"), ("box", "near")}, "no tier misses a pair"
     if tier != "bound":
         assert answer.contacts.depth.tolist()[0] == pytest.approx(0.25)
+
+
+# ---------------------------------------------------------------------------------------------- all pairs of effects
+
+OPTIONAL = tuple(effect.name for effect in EFFECTS if effect.optional)
+DEPENDS = {"witness": {"distance"}, "rotation": {"first_contact"}, "cross_check": {"distance"}}
+
+
+def crowded(**modes: str) -> Engine:
+    """Everything that an effect could be about: pairs apart, deep, moving, turning, seen."""
+    engine = make(**modes)
+    spin = gs.SceneObject("spin", gs.Box((2.0, 0.1, 0.1)), (0, 0, 9, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1))
+    engine.apply(gs.SceneUpdate(add=[spin, gs.SceneObject("post", gs.Sphere(0.5), (0, 1.5, 9, 0, 0, 0, 1))]))
+    return engine
+
+
+def outputs(engine: Engine) -> dict[str, bytes]:
+    """What each effect adds to an evaluation, in bytes; empty if nothing."""
+    got = engine.evaluate(EVERYTHING)
+    out = dict.fromkeys(OPTIONAL, b"")
+    if got.visible is not None:
+        out["cull"] = got.visible.state.tobytes() + got.visible.certain.tobytes()
+    if (near := got.distances) is not None:
+        apart = near.distance > 0
+        out["distance"] = b"".join(x[apart].tobytes() for x in (near.distance, near.lower, near.upper, near.status))
+        if not np.isnan(near.point_a[apart]).all():
+            out["witness"] = b"".join(x[apart].tobytes() for x in (near.point_a, near.point_b, near.normal))
+    if (contacts := got.contacts) is not None:
+        out["penetration"] = contacts.depth[~np.isnan(contacts.depth)].tobytes()
+        rows = contacts.pairs
+        turning = np.array(["spin" in pair for pair in zip(rows.ids_a, rows.ids_b, strict=True)], dtype=bool)
+        later = (rows.time > 0) & ~turning
+        out["first_contact"] = rows.time[later].tobytes() + rows.normal[later].tobytes()
+        out["rotation"] = rows.time[turning & (rows.time > 0)].tobytes()
+        out["contact_set"] = b"".join(
+            rows.points[rows.point_offsets[k] : rows.point_offsets[k + 1]].tobytes() for k in np.flatnonzero(~turning)
+        )
+    return out
+
+
+WHOLE = outputs(crowded())
+
+
+def test_every_effect_has_something_to_say() -> None:
+    assert {name for name, value in WHOLE.items() if value} == set(OPTIONAL) - {"cross_check", "markers"}
+
+
+@pytest.mark.parametrize(("one", "other"), itertools.combinations(OPTIONAL, 2))
+def test_two_effects_off_leave_the_others_bit_identical(one, other) -> None:
+    off = {one, other}
+    gone = off | {name for name, needs in DEPENDS.items() if needs & off}
+    engine = crowded(**dict.fromkeys(off, "off"))
+    left = outputs(engine)
+    for name in OPTIONAL:
+        if name in gone:
+            assert left[name] == b"" and engine.counters[name] == 0, f"{name} ran"
+        elif name == "contact_set" and "first_contact" in off:
+            assert WHOLE[name].startswith(left[name]) and left[name], "what touches later has no points now"
+        else:
+            assert left[name] == WHOLE[name], name
+    stages = {stage.name: stage for stage in engine.plan(EVERYTHING)}
+    assert all(f"switched off by effects.{name}" == stages[name].reason for name in off)
+
+
+def test_switched_on_is_asked_for_by_nobody() -> None:
+    engine = crowded(rotation="on", cull="on")
+    stages = {stage.name: stage for stage in engine.plan(frozenset())}
+    assert {name for name, stage in stages.items() if stage.active} == {"cull", "contact", "first_contact", "rotation"}
+    assert {stages[name].reason for name in ("contact", "first_contact", "rotation")} == {
+        "switched on by effects.rotation"
+    }
+    answer = engine.evaluate(frozenset())
+    assert answer.contacts is not None and answer.visible is not None and answer.distances is None
+    assert len(answer.contacts.pairs.points) == 0 and engine.counters["contact_set"] == 0
+
+
+def test_what_turns_is_not_followed_when_that_is_off() -> None:
+    rows = crowded(rotation="off").evaluate(EVERYTHING).contacts.pairs
+    assert [x for x in rows.unsupported if "spin" in x] == [
+        ("post", "spin", "first contact of what turns is switched off")
+    ]
+
+
+def test_words_that_yaml_reads_as_booleans() -> None:
+    config = Config().changed({"effects.cull": False, "effects.witness": True, "cross_check.mode": False})
+    assert (config.effects_cull, config.effects_witness, config.cross_check_mode) == ("off", "on", "off")
+    with pytest.raises(gs.GeometryError, match="effects.cull must be one of auto, on, off, got 'maybe'"):
+        Config().changed({"effects.cull": "maybe"})
+
+
+def test_the_cross_check_can_be_switched_alone() -> None:
+    config = Config(cross_check_mode="all", effects_cross_check="off")
+    engine = Engine(config)
+    assert engine.cross_check.mode == "off"
+    (stage,) = [stage for stage in engine.plan(EVERYTHING) if stage.name == "cross_check"]
+    assert (stage.active, stage.reason) == (False, "switched off by effects.cross_check")
+    engine.configure(Config(effects_cross_check="on"))
+    try:
+        assert engine.cross_check.mode == "all"
+    finally:
+        engine.close()

@@ -971,7 +971,7 @@ def test_half_filled_answers_are_thrown_away(desk, monkeypatch) -> None:
 def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     desk = Desk()
     taken = []
-    monkeypatch.setattr(desk.engine, "config", Config(cross_check_mode="all"))
+    monkeypatch.setattr(desk.engine.cross_check, "mode", "all")
     for name in ("submit_pairs", "submit_scene"):
         monkeypatch.setattr(desk.engine.cross_check, name, lambda *arguments: taken.append(arguments))
     desk.ask("Distance", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "cone"])

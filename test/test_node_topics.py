@@ -315,10 +315,17 @@ def test_state(client, ports, inboxes) -> None:
     state = inboxes["state"].wait(lambda m: m.scene_version >= version)
     assert (state.object_count, state.moving_count, state.enabled) == (2, 1, True)
     plan = dict(zip(state.plan_stages, zip(state.plan_active, state.plan_reasons, strict=True), strict=True))
-    assert plan["distance"] == (1, "asked for") and plan["cross_check"][0] == 0
+    assert plan["distance"] == (1, "asked for by ~/distances") and plan["cross_check"][0] == 0
+    assert plan["rotation"] == (0, "no shape has angular velocity")
     assert "2 solids" in state.scene_plan
     counters = dict(zip(state.counter_names, state.counter_values, strict=True))
     assert counters["evaluations"] > 0 and counters["distance"] > 0 and "cross_check" not in counters
+    client.call(srv.Distance, "distance", select=2, max_distance=20.0, accuracy="exact")
+    state = inboxes["state"].wait(lambda m: "~/distance" in m.cost_queries)
+    columns = (state.cost_tiers, state.cost_calls, state.cost_items, state.cost_ns)
+    costs = {(query, tier): rest for query, tier, *rest in zip(state.cost_queries, *columns, strict=True)}
+    assert costs["~/distance", "exact"][:2] == [1, 1] and costs["~/distance", "exact"][2] > 0
+    assert costs["~/distances", "float64"][0] >= 1
     assert list(state.input_topics) == ["~/shapes", "~/states", "~/polygons", "~/camera_info"]
     assert len(state.input_ages) == len(state.input_received) == len(state.input_refused) == 4
     assert state.cross_check_mode == "off" and state.qos_mismatches == []

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from geomsrv import _validate, queries
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus, gather
+from geomsrv.effects import OFF, ON
 from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError, NotAvailableError, SceneError
 from geomsrv.ladder import AUTO, Quality
@@ -250,7 +251,7 @@ class Handlers:
             return False
         accuracy = "float64" if quality["accuracy"] == AUTO else quality["accuracy"]
         flat = request.poses_a + request.poses_b
-        if len(flat) != 14 or len(request.poses_a) != 7 or self.engine.config.cross_check_mode != "off":
+        if len(flat) != 14 or len(request.poses_a) != 7 or self.engine.cross_check.mode != "off":
             return False
         try:
             a, b = convert.shape_from(request.shapes_a[0]), convert.shape_from(request.shapes_b[0])
@@ -280,7 +281,7 @@ class Handlers:
         """Every pair within max_distance, nearest first, then those that are unsupported."""
         engine = self.engine
         near = engine.scene.distances(request.max_distance, want=want, **quality)
-        if engine.config.cross_check_mode != "off":
+        if engine.cross_check.mode != "off":
             engine.cross_check.submit_scene(engine.scene, near)
         order, missing = np.argsort(near.distance, kind="stable"), near.unsupported
         ids_a, ids_b, rows = near.ids_a, near.ids_b, order.tolist()
@@ -300,7 +301,7 @@ class Handlers:
         quality = self._quality(request)
         self._allowed("first_contact")
         want = self._want(request, "first_contact", "contact_set")
-        contact_set = "contact_set" in want
+        contact_set, rotation = "contact_set" in want, self.engine.config.effects_rotation != OFF
         answer: PairContacts | ListedContacts
         order: IntArray | None
         if request.select == ALL:
@@ -311,6 +312,7 @@ class Handlers:
                 margin=request.margin,
                 earliest=request.earliest,
                 contact_set=contact_set,
+                rotation=rotation,
                 **quality,
             )
             order = np.argsort(answer.time, kind="stable")
@@ -324,7 +326,13 @@ class Handlers:
             if request.certificates and request.margin != 0.0:
                 raise NotAvailableError("certificates are given for contact, not for coming as near as a margin")
             answer = listed_first_contacts(
-                world, pairs, request.horizon, margin=request.margin, contact_set=contact_set, **quality
+                world,
+                pairs,
+                request.horizon,
+                margin=request.margin,
+                contact_set=contact_set,
+                rotation=rotation,
+                **quality,
             )
             order = None  # that of the request
             if request.certificates:
@@ -436,13 +444,14 @@ class Handlers:
     def _allowed(self, *effects: str) -> None:
         """Refuse what the configuration has switched off."""
         for effect in effects:
-            if not getattr(self.engine.config, f"effects_{effect}", True):
+            if self.engine.config.modes.get(effect) == OFF:
                 raise NotAvailableError(f"{effect} is switched off by the parameter effects.{effect}")
 
     def _want(self, request: Any, *known: str) -> tuple[str, ...]:
         effects = tuple(_validate.want(request.want, known))
         self._allowed(*effects)
-        return effects
+        modes = self.engine.config.modes
+        return effects + tuple(effect for effect in known if modes.get(effect) == ON and effect not in effects)
 
     def _frustum(self, request: Any) -> Frustum:
         if request.view == FRUSTUM:

@@ -41,7 +41,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 import geomsrv.msg as msg
 import geomsrv.srv as srv
 from geomsrv.config import Config, Setting, settings
-from geomsrv.engine import CONTACTS, DISTANCES, MARKERS, VISIBLE, Engine
+from geomsrv.effects import CONTACTS, DISTANCES, MARKERS, OFF, ON, VISIBLE
+from geomsrv.engine import Engine
 from geomsrv.errors import GeometryError
 from geomsrv.ros import convert, reports
 from geomsrv.ros.handlers import Handlers
@@ -385,12 +386,17 @@ class GeomsrvNode(LifecycleNode):
             self._outputs[topic].publish(message)
             yield
         # The drawing shows the contacts just found.
-        if self._config.effects_markers and self._outputs[MARKERS].get_subscription_count():
+        if self._draws():
             self._drawing.request(1.0 / self._config.markers_rate)
+
+    def _draws(self) -> bool:
+        """Whether a drawing is asked for."""
+        mode = self._config.effects_markers
+        return mode == ON or (mode != OFF and self._outputs[MARKERS].get_subscription_count() > 0)
 
     def _draw(self) -> Iterator[None]:
         engine = self._engine
-        if engine is None or not (self._active and self._config.effects_markers):
+        if engine is None or not (self._active and self._draws()):
             return
         engine.counters["drawings"] += 1
         markers: list[Any] = []
@@ -560,6 +566,8 @@ def _descriptor(setting: Setting) -> ParameterDescriptor:
     text = f"{setting.description} [{setting.unit}]" if setting.unit else setting.description
     descriptor = ParameterDescriptor(description=text, read_only=setting.read_only)
     if setting.choices:
+        # YAML reads `off` and `on` as booleans.
+        descriptor.dynamic_typing = OFF in setting.choices
         descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"
     if setting.length:
         descriptor.additional_constraints = f"{setting.length} numbers"

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geomsrv.crosscheck import Tally
-from geomsrv.engine import Engine, Stage
+from geomsrv.effects import Stage
+from geomsrv.engine import Engine
 from geomsrv.ros import convert
 from geomsrv.ros.inputs import InputRecord
 
