@@ -35,6 +35,7 @@ from geomsrv.ladder import (
 from geomsrv.mesh import first_contact_meshes
 from geomsrv.region import Region, distance_regions, first_contact_regions, intersects_regions
 from geomsrv.shapes import (
+    CURVED,
     Boxes,
     Capsule,
     Convex,
@@ -641,10 +642,11 @@ def intersects(
         record = certify_distances(a, b, signed=True) if proven else None
         return Booleans(meet, certain, answer.status, answer.cost, _record=record)
     # Without depth exact arithmetic tells touching from overlapping, too; float64 needs the margin.
-    want = () if accuracy == "exact" else ("penetration",)
+    by_depth = accuracy != "exact" or any(isinstance(body, CURVED) for body in (a, b))
+    want = ("penetration",) if by_depth else ()
     answer = distance(a, b, poses_ab, accuracy=accuracy, want=want, certificates=certificates)
     value, certain = answer.distance <= 0.0, (answer.lower > 0.0) | (answer.upper <= 0.0)
-    if accuracy == "exact" and not any(isinstance(body, (Sphere, Capsule, HalfSpace)) for body in (a, b)):
+    if not by_depth and not any(isinstance(body, (Sphere, Capsule, HalfSpace)) for body in (a, b)):
         # Correctly rounded: the upper neighbour of a distance, however short, is no zero.
         value, certain = answer.upper <= 0.0, answer.status == DistanceStatus.OK
     return Booleans(

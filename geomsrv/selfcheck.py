@@ -21,7 +21,7 @@ from geomsrv._selfcheck_cases import CASES
 from geomsrv.answers import ContactStatus, CullState, Distances
 from geomsrv.queries import cull, distance, distance_to_frustum, first_contact
 from geomsrv.scene import Scene, SceneObject, SceneUpdate
-from geomsrv.shapes import Box, Boxes, Cone, Frustum, Polygon, Polygons, Sphere
+from geomsrv.shapes import Box, Boxes, Frustum, Mesh, Polygon, Polygons, Sphere
 
 __all__ = ["Check", "SelfCheck", "cases", "self_check"]
 
@@ -231,9 +231,10 @@ def _touching_row() -> str:
 
 
 def _unsupported() -> str:
-    """A cone has no kernel: that is said, and no distance is made up."""
+    """A mesh has no kernel: that is said, and no distance is made up."""
     scene = Scene()
-    scene.apply(SceneUpdate(add=[SceneObject("a", Cone(1.0, 1.0)), SceneObject("b", Sphere(1.0))]))
+    mesh = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    scene.apply(SceneUpdate(add=[SceneObject("a", mesh), SceneObject("b", Sphere(1.0))]))
     answer = scene.distances(1.0)
     named = [(a, b) for a, b, _ in answer.unsupported]
     return "" if len(answer) == 0 and named == [("a", "b")] else f"{len(answer)} rows, unsupported {named}"

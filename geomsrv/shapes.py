@@ -601,6 +601,9 @@ class Ellipsoid(Shape):
         freeze(self, radii=sizes)
 
 
+CURVED = (Cylinder, Cone, Ellipsoid)  #: solids that are no polytope, nor one with a ball added to it
+
+
 @dataclass(frozen=True, init=False, eq=False)
 class Box(Shape):
     """Solid box with `half_extents` (3,) [m] >= 0 along x, y, z."""

@@ -20,6 +20,7 @@ from geomsrv.ladder import Quality, climb
 from geomsrv.narrow_phase import count_rungs
 from geomsrv.queries import CULL_COUNTS, CULL_STAGES, RUNGS, SEEING, TIERS
 from geomsrv.shapes import (
+    CURVED,
     Box,
     Capsule,
     Cone,
@@ -144,12 +145,14 @@ def _by_shape(
     if len(known):
         solids = [shape for shape, one in zip(shapes, answered.tolist(), strict=True) if one]
         vague = slack[known]
-        gaps = _gaps(frustum, solids, world.poses[rows[known]], tier, bool(vague.any()), counts)
+        curved = np.array([isinstance(shape, CURVED) for shape in solids], dtype=bool)
+        deep = bool(vague.any() or curved.any())
+        gaps = _gaps(frustum, solids, world.poses[rows[known]], tier, deep, counts)
         rounding = gaps.rounding + vague
         apart = gaps.lower > rounding
         flat = np.array([not isinstance(shape, Sphere | Capsule | HalfSpace) for shape in solids], dtype=bool)
         # Correctly rounded: the upper neighbour of a distance, however short, is no zero.
-        decided = flat & (vague == 0.0) & (tier == "exact") & (gaps.status == DistanceStatus.OK)
+        decided = flat & ~curved & (vague == 0.0) & (tier == "exact") & (gaps.status == DistanceStatus.OK)
         meets = np.where(decided, gaps.upper <= 0.0, gaps.distance <= 0.0)
         if tier == "bound":
             meets = ~apart

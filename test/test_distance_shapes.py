@@ -48,7 +48,8 @@ WORST = {
     "convex":     (None, None,   None, 0.8,   1.4),
     "half_space": (None, None,   None, None,  0.0),
 }  # fmt: skip
-SUPPORTED = KINDS[:5]
+SUPPORTED = KINDS[:5]  # those that the exact oracle knows; for the curved ones see test_curved.py
+ANSWERED = KINDS[:8]
 PAIRS = [pair for pair in itertools.combinations_with_replacement(SUPPORTED, 2) if pair != ("half_space", "half_space")]
 
 
@@ -73,7 +74,7 @@ def one_of(kind: str) -> gs.Shape:
 
 def test_the_table_is_what_the_engine_says() -> None:
     assert _core.shape_kinds() == KINDS
-    expected = np.array([[a in SUPPORTED and b in SUPPORTED for b in KINDS] for a in KINDS])
+    expected = np.array([[a in ANSWERED and b in ANSWERED for b in KINDS] for a in KINDS])
     assert np.array_equal(_core.supported_pairs(), expected)
 
 
@@ -85,7 +86,7 @@ def test_every_pair_answers_or_says_that_it_cannot(kind_a: str, kind_b: str) -> 
     for want in ((), DEEP):
         answer = gs.distance(a, b, pose, want=want)
         meet = gs.intersects(a, b, pose)
-        if kind_a in SUPPORTED and kind_b in SUPPORTED:
+        if kind_a in ANSWERED and kind_b in ANSWERED:
             assert answer.status[0] == gs.DistanceStatus.OK and answer.message == ""
             assert answer.lower[0] <= answer.distance[0] <= answer.upper[0]
             assert meet.value[0] == (answer.distance[0] <= 0.0) and meet.certain[0]

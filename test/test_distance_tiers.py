@@ -182,7 +182,7 @@ def test_half_spaces_are_answered_as_by_doubles(rng: np.random.Generator) -> Non
 
 @pytest.mark.parametrize("tier", TIERS)
 def test_other_pairs_are_unsupported(tier: str) -> None:
-    answer = gs.distance(gs.Cylinder(1.0, 1.0), gs.Sphere(1.0), [9, 0, 0, 0, 0, 0, 1], accuracy=tier)
+    answer = gs.distance(gs.Mesh(np.eye(3), [[0, 1, 2]]), gs.Sphere(1.0), [9, 0, 0, 0, 0, 0, 1], accuracy=tier)
     assert answer.status[0] == gs.DistanceStatus.UNSUPPORTED and np.isnan(answer.distance[0])
 
 

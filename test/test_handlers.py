@@ -34,13 +34,14 @@ def obj(name, shape, position=(0, 0, 0), velocity=(0, 0, 0), **fields):
 
 
 SQUARE = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
+SHEET = gs.Mesh([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0, 0.5, 0)], [(0, 1, 2)])  # a kind that distance has no kernel for
 OBJECTS = [
     obj("ball", gs.Sphere(0.5), (2, 0, 0)),
     obj("box", gs.Box([1, 1, 1])),
     obj("far", gs.Sphere(0.25), (0, 9, 0)),
     obj("left", SQUARE, (0, 0, 0), (1, 0, 0)),
     obj("right", SQUARE, (3, 0.5, 0)),
-    obj("cone", gs.Cone(0.5, 1.0), (0, 0, 4)),
+    obj("sheet", SHEET, (0, 0, 4)),
 ]
 
 
@@ -150,8 +151,10 @@ def test_distance_of_two_bodies(desk) -> None:
     got = desk.ask("Distance", **fields, shapes_b=shapes(gs.Box([1, 1, 1])), want=["witness"])
     assert got.status == OK and got.distance.tolist() == [1.0] and got.normal.tolist() == [1, 0, 0]
     assert got.cost.stages == ["narrow box-sphere"] and got.scene_version == 0 and got.ids_a == []
+    sheet = desk.ask("Distance", **fields, shapes_b=shapes(SHEET))
+    assert sheet.status == UNSUPPORTED and "mesh-sphere" in sheet.message
     cone = desk.ask("Distance", **fields, shapes_b=shapes(gs.Cone(1, 1)))
-    assert cone.status == UNSUPPORTED and "cone-sphere" in cone.message
+    assert cone.status == OK and cone.distance[0] == pytest.approx(math.sqrt(4.25) - 1.0, abs=1e-14)
     flat = desk.ask("Distance", **fields, shapes_b=shapes(SQUARE))
     assert flat.status == UNSUPPORTED and "polygons" in flat.message
 
@@ -160,19 +163,19 @@ def test_distance_of_all_pairs_nearest_first(desk) -> None:
     got = desk.ask("Distance", select=ALL, max_distance=8.0, want=["witness"])
     found = list(zip(got.ids_a, got.ids_b, got.distance, strict=True))
     assert found[:3] == [("ball", "box", 0.5), ("left", "right", 2.0), ("box", "far", 7.75)]
-    assert got.status == UNSUPPORTED and "cone" in got.message
+    assert got.status == UNSUPPORTED and "mesh" in got.message
     assert all(status == 2 and math.isnan(d) for status, d in zip(got.item_status[3:], got.distance[3:], strict=True))
-    assert {b for _, b, _ in found[3:]} | {a for a, _, _ in found[3:]} >= {"cone"}
-    desk.engine.apply(gs.SceneUpdate(remove=["cone"]))
+    assert {b for _, b, _ in found[3:]} | {a for a, _, _ in found[3:]} >= {"sheet"}
+    desk.engine.apply(gs.SceneUpdate(remove=["sheet"]))
     rest = desk.ask("Distance", select=ALL, max_distance=0.6)
     assert rest.status == OK and rest.distance.tolist() == [0.5]
     assert "never" in rest.message, "polygons and solids are not compared, and the message says so"
 
 
 def test_unsupported_pairs_are_named_and_the_others_answered(desk) -> None:
-    got = desk.ask("Distance", select=BY_IDS, ids_a=["ball", "ball", "ball"], ids_b=["cone", "box", "left"])
+    got = desk.ask("Distance", select=BY_IDS, ids_a=["ball", "ball", "ball"], ids_b=["sheet", "box", "left"])
     assert got.status == UNSUPPORTED
-    assert "distance cone-sphere is unsupported" in got.message and "polygons" in got.message
+    assert "distance mesh-sphere is unsupported" in got.message and "polygons" in got.message
     assert got.item_status.tolist() == [2, 0, 2] and got.distance[1] == 0.5 and math.isnan(got.distance[0])
 
 
@@ -245,22 +248,22 @@ def test_first_contact_inline_with_twists(desk) -> None:
     t = turning.time[0]
     assert 0.5 * t + math.cos(0.1 * t) == pytest.approx(3.0, abs=1e-5)
     assert 0.0 < turning.time_upper[0] - turning.time_lower[0] <= 1e-6
-    cone = desk.ask(
+    sheet = desk.ask(
         "FirstContact",
-        **fields | {"shapes_a": shapes(gs.Cone(0.5, 1.0)), "shapes_b": shapes(gs.Sphere(1.0))},
+        **fields | {"shapes_a": shapes(SHEET), "shapes_b": shapes(gs.Sphere(1.0))},
         twists_a=D([0.5, 0, 0, 0, 0, 0.1]),
     )
-    assert cone.status == UNSUPPORTED and cone.item_status.tolist() == [4] and math.isnan(cone.time[0])
+    assert sheet.status == UNSUPPORTED and sheet.item_status.tolist() == [4] and math.isnan(sheet.time[0])
 
 
 def test_first_contact_of_all_pairs(desk) -> None:
     got = desk.ask("FirstContact", select=ALL, horizon=5.0, want=["contact_set", "first_contact"])
     pairs = dict(zip(zip(got.ids_a, got.ids_b, strict=True), got.item_status, strict=True))
-    assert got.status == OK and pairs == {("left", "right"): 1}, "the cone is too far away to matter"
-    desk.engine.apply(gs.SceneUpdate(add=[obj("cone", gs.Cone(0.5, 1.0), (0, 0, 1))]))
+    assert got.status == OK and pairs == {("left", "right"): 1}, "the sheet is too far away to matter"
+    desk.engine.apply(gs.SceneUpdate(add=[gs.SceneObject("sheet", SHEET, (0, 0, 1.5, 0, 0, 0, 1), (0, 0, 0, 1, 0, 0))]))
     got = desk.ask("FirstContact", select=ALL, horizon=5.0)
-    assert got.status == UNSUPPORTED and "cone" in got.message and 4 in got.item_status
-    desk.engine.apply(gs.SceneUpdate(remove=["cone"], add=[obj("deep", gs.Box([1, 1, 1]), (-0.5, 0, 0))]))
+    assert got.status == UNSUPPORTED and "mesh" in got.message and 4 in got.item_status
+    desk.engine.apply(gs.SceneUpdate(remove=["sheet"], add=[obj("deep", gs.Box([1, 1, 1]), (-0.5, 0, 0))]))
     now = desk.ask("FirstContact", select=ALL, horizon=5.0)
     assert now.status == OK and now.time.tolist() == sorted(now.time)
     assert ("box", "deep") == (now.ids_a[0], now.ids_b[0]) and now.item_status[0] == 3 and now.time[0] == 0.0
@@ -409,7 +412,11 @@ def test_distance_batch_of_shapes_at_many_poses(desk) -> None:
     )
     assert np.allclose(hull.distance, 2.0)
     cone = desk.ask("DistanceBatch", kind_a=1, values_a=D([1.0]), kind_b=4, values_b=D([1, 1]), poses_ab=poses)
-    assert cone.status == UNSUPPORTED and "sphere-cone" in cone.message and cone.item_status.tolist() == [2, 2, 2]
+    assert cone.status == OK and list(cone.item_status) == [0, 0, 0] and cone.distance[0] > cone.distance[2] == 0.0
+    flat = desk.ask(
+        "DistanceBatch", kind_a=1, values_a=D([1.0]), kind_b=14, values_b=D([0, 0, 1, 0, 0, 1]), poses_ab=poses
+    )
+    assert flat.status == UNSUPPORTED and "sphere-polygon" in flat.message and flat.item_status.tolist() == [2, 2, 2]
 
 
 def test_first_contact_batch(desk) -> None:
@@ -455,7 +462,7 @@ RINGS = {"vertices_a": D([0, 0, 1, 0, 0, 1]), "offsets_a": convert.uint32s([0, 3
 CERTIFIED = {
     "distance by ids": (
         "Distance",
-        {"ids_a": ["box", "left", "left", "cone"], "ids_b": ["ball", "right", "ball", "box"]},
+        {"ids_a": ["box", "left", "left", "sheet"], "ids_b": ["ball", "right", "ball", "box"]},
         [1, 1, 0, 0],
     ),
     "distance to the nearest": ("Distance", {"ids_a": ["box", "far"]}, [1, 1]),
@@ -974,9 +981,9 @@ def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     monkeypatch.setattr(desk.engine.cross_check, "mode", "all")
     for name in ("submit_pairs", "submit_scene"):
         monkeypatch.setattr(desk.engine.cross_check, name, lambda *arguments: taken.append(arguments))
-    desk.ask("Distance", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "cone"])
+    desk.ask("Distance", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "sheet"])
     ((world, pairs, answer),) = taken
-    assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "cone"]]
+    assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "sheet"]]
     assert answer.status.tolist() == [0, 2] and len(answer.distance) == 2
     desk.ask("Distance", select=ALL, max_distance=1.0)
     scene, near = taken[1]

@@ -25,7 +25,7 @@ def random_scene(rng, uncertain=False) -> gs.Scene:
         lambda: gs.Box(rng.uniform(0.2, 1, 3)),
         lambda: gs.Capsule(0.2, 1.0),
         lambda: gs.Convex(rng.normal(size=(6, 3))),
-        lambda: gs.Cone(0.3, 1.0),
+        lambda: gs.Mesh(rng.normal(size=(4, 3)), [(0, 1, 2), (0, 2, 3)]),
     ]
     solids = [gs.SceneObject(f"s{i}", makers[i % 5](), pose(), (*rng.normal(size=3), 0, 0, 0)) for i in range(10)]
     square = gs.Polygon([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -80,7 +80,7 @@ def test_distances_are_those_of_the_scene(rng, uncertain) -> None:
         elif got.distance[k] > 0:
             assert np.allclose(got.normal[k], -want.normal[row], atol=1e-6), info
     assert known > 100 and swapped > 50 and unsupported > 100
-    assert "cone" in got.message and "polygons are compared with polygons only" in got.message
+    assert "mesh" in got.message and "polygons are compared with polygons only" in got.message
 
 
 @pytest.mark.parametrize("uncertain", [False, True])
@@ -152,7 +152,8 @@ def test_a_pair_with_itself_is_named(rng) -> None:
 
 def test_two_bodies_get_the_same_answer_the_short_way(rng) -> None:
     makers = [gs.Sphere(0.5), gs.Box([0.2, 0.4, 0.6]), gs.Capsule(0.2, 1.0), gs.Convex(rng.normal(size=(6, 3)))]
-    shapes = [*makers, gs.HalfSpace([0.0, 0.6, 0.8], -1.0), gs.Cone(0.3, 1.0), gs.Polygon([[0, 0], [1, 0], [0, 1]])]
+    shapes = [*makers, gs.HalfSpace([0.0, 0.6, 0.8], -1.0), gs.Mesh(np.eye(3), [[0, 1, 2]])]
+    shapes += [gs.Cone(0.3, 1.0), gs.Polygon([[0, 0], [1, 0], [0, 1]])]
     answered = refused = 0
     for a in shapes:
         for b in shapes:

@@ -21,6 +21,7 @@ from geomsrv.broad_phase import boxes_now, boxes_swept
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 REST = np.zeros(6)
 INF = np.inf
+SHEET = gs.Mesh([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)], [(0, 1, 2)])  # no kernel measures it
 
 
 def at(*position, yaw=0.0):
@@ -216,10 +217,10 @@ def test_nearest_pair_without_a_pair():
     two = [gs.SceneObject("a", gs.Sphere(1.0)), gs.SceneObject("b", gs.Sphere(1.0))]
     assert len(scene_of(two, allowed_pairs=[("b", "a")]).nearest_pair()) == 0
     assert len(scene_of(two).nearest_pair()) == 1
-    cones = [gs.SceneObject(name, gs.Cone(1.0, 1.0)) for name in "ab"]
-    answer = scene_of(cones).nearest_pair()
+    sheets = [gs.SceneObject(name, SHEET) for name in "ab"]
+    answer = scene_of(sheets).nearest_pair()
     assert len(answer) == 0
-    assert answer.unsupported == [("a", "b", "distance cone-cone is unsupported in this version")]
+    assert answer.unsupported == [("a", "b", "distance mesh-mesh is unsupported in this version")]
     far = [gs.SceneObject("a", gs.Sphere(1.0)), gs.SceneObject("b", gs.Sphere(1.0), at(1e200, 0.0, 0.0))]
     assert scene_of(far).nearest_pair().distance[0] == pytest.approx(1e200)
 
@@ -326,31 +327,29 @@ def test_allowed_pairs_are_ignored():
 
 def test_pairs_without_a_kernel_are_named():
     objects = [
-        gs.SceneObject("a cone", gs.Cone(1.0, 1.0)),
-        gs.SceneObject("b cylinder", gs.Cylinder(1.0, 1.0), at(0.5, 0.0, 0.0)),
-        gs.SceneObject("c ellipsoid", gs.Ellipsoid((1.0, 1.0, 1.0)), at(0.0, 0.0, 9.0)),
+        gs.SceneObject("a sheet", SHEET),
+        gs.SceneObject("b can", gs.Cylinder(1.0, 1.0), at(0.5, 0.0, 0.0)),
+        gs.SceneObject("c floor", gs.HalfSpace((0.0, 0.0, 1.0), -9.0)),
         gs.SceneObject("d ball", gs.Sphere(1.0), at(0.0, 1.0, 0.0)),
         gs.SceneObject("e ball", gs.Sphere(1.0), at(0.0, 2.0, 0.0)),
     ]
     scene = scene_of(objects)
     answer = scene.distances(0.5)
-    assert rows_of(answer) == {("d ball", "e ball"): 0}
+    assert rows_of(answer) == {("b can", "d ball"): 0, ("b can", "e ball"): 1, ("d ball", "e ball"): 2}
     assert (answer.status == DistanceStatus.OK).all()
     reason = "distance {} is unsupported in this version"
     assert answer.unsupported == [
-        ("a cone", "b cylinder", reason.format("cone-cylinder")),
-        ("a cone", "d ball", reason.format("cone-sphere")),
-        ("a cone", "e ball", reason.format("cone-sphere")),
-        ("b cylinder", "d ball", reason.format("cylinder-sphere")),
-        ("b cylinder", "e ball", reason.format("cylinder-sphere")),
+        ("a sheet", "b can", reason.format("cylinder-mesh")),
+        ("a sheet", "d ball", reason.format("mesh-sphere")),
+        ("a sheet", "e ball", reason.format("mesh-sphere")),
     ]
-    assert answer.cost.counts["unsupported"] == 5
-    assert "2 x distance cone-sphere is unsupported" in answer.message
-    assert "cone-cylinder" in scene.plan() and "ellipsoid-sphere" in scene.plan() and "cone-cone" not in scene.plan()
+    assert answer.cost.counts["unsupported"] == 3
+    assert "2 x distance mesh-sphere is unsupported" in answer.message
+    assert "cylinder-mesh" in scene.plan() and "half_space-mesh" in scene.plan() and "mesh-mesh" not in scene.plan()
     # For first contact such pairs have a row: never dropped.
     contacts = scene.first_contacts(1.0)
     assert contacts.unsupported == answer.unsupported
-    assert contacts.status[rows_of(contacts)["a cone", "d ball"]] == ContactStatus.UNSUPPORTED
+    assert contacts.status[rows_of(contacts)["a sheet", "d ball"]] == ContactStatus.UNSUPPORTED
 
 
 def test_solids_and_polygons_are_not_compared_and_said_so_once():
@@ -1254,9 +1253,10 @@ def test_other_shapes_are_culled_by_what_they_are():
         "far floor": (gs.HalfSpace((0.0, 1.0, 0.0), -11.0), (0.0, 0.0, 0.0), gs.OUTSIDE),
         "can in": (gs.Cylinder(0.5, 1.0), (0.0, 0.0, 5.0), gs.INSIDE),
         "can out": (gs.Cylinder(0.5, 1.0), (0.0, 20.0, 5.0), gs.OUTSIDE),
-        "can cut": (gs.Cylinder(0.5, 1.0), (0.0, 5.0, 5.0), gs.Visibility.MAY_INTERSECT),
+        "can cut": (gs.Cylinder(0.5, 1.0), (0.0, 5.0, 5.0), gs.INTERSECTS),
         "cone at the edge": (gs.Cone(0.5, 1.0), (0.0, 0.0, 1.5), gs.INSIDE),
-        "ellipsoid cut": (gs.Ellipsoid((1.0, 1.0, 2.0)), (0.0, 0.0, 9.0), gs.Visibility.MAY_INTERSECT),
+        "ellipsoid cut": (gs.Ellipsoid((1.0, 1.0, 2.0)), (0.0, 0.0, 9.0), gs.INTERSECTS),
+        "sheet cut": (SHEET, (0.0, 5.0, 5.0), gs.Visibility.MAY_INTERSECT),
         "footprint": (ring, (0.0, 0.0, 0.0), gs.OUTSIDE),
     }
     scene = scene_of([gs.SceneObject(name, shape, at(*where)) for name, (shape, where, _) in expected.items()])
@@ -1264,10 +1264,10 @@ def test_other_shapes_are_culled_by_what_they_are():
     got = dict(zip(answer.ids, answer.state.tolist(), strict=True))
     assert got == {name: int(state) for name, (_, _, state) in expected.items()}
     certain = dict(zip(answer.ids, answer.certain.tolist(), strict=True))
-    assert all(certain[name] for name in expected if "can cut" != name != "ellipsoid cut" and "edge" not in name)
-    assert not certain["can cut"] and not certain["ellipsoid cut"]
-    assert answer.message == "judged by their bounding box: cylinder, ellipsoid"
-    assert "cone, cylinder, ellipsoid" in scene.plan()
+    assert all(certain[name] for name in expected if name != "sheet cut" and "edge" not in name)
+    assert not certain["sheet cut"]
+    assert answer.message == "judged by their bounding box: mesh"
+    assert "mesh" in scene.plan()
     # A camera that looks along the plane sees polygons.
     flat = gs.Frustum((-5.0, 0.0, 0.5), [[0, 1, 0], [0, 0, 1], [1, 0, 0]], 0.2, 0.2, 1.0, 10.0)
     assert dict(zip(*(lambda a: (a.ids, a.state.tolist()))(scene.cull(flat)), strict=True))["footprint"] == gs.INSIDE

@@ -179,13 +179,14 @@ def test_earliest_of_equals_is_the_first_by_id():
 
 
 def test_earliest_keeps_what_is_unsupported():
-    cone = gs.SceneObject("cone", gs.Cone(0.5, 1.0), [0, 0, 3.0, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0])
+    sheet = gs.Mesh([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [(0, 1, 2)])
+    flying = gs.SceneObject("flying", sheet, [0, 0, 3.0, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0.5])
     cubes = [
         gs.SceneObject(name, gs.Box([0.5, 0.5, 0.5]), [0, 0, z, 0, 0, 0, 1], [0, 0, v, 0, 0, 0])
         for name, z, v in (("low", 0.0, 0.0), ("up", 9.0, -4.0))
     ]
-    answer = scene_of([cone, *cubes]).first_contacts(4.0, earliest=True)
-    assert [pair[:2] for pair in answer.unsupported] == [("cone", "low"), ("cone", "up")]
+    answer = scene_of([flying, *cubes]).first_contacts(4.0, earliest=True)
+    assert [pair[:2] for pair in answer.unsupported] == [("flying", "low"), ("flying", "up")]
     assert [ContactStatus(s) for s in answer.status] == [ContactStatus.UNSUPPORTED] * 2 + [ContactStatus.WILL_TOUCH]
     assert answer.time[2] == 2.0
 

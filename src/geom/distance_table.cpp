@@ -9,6 +9,7 @@
 
 #include "geom/bounding_distance.hpp"
 #include "geom/convex_convex.hpp"
+#include "geom/curved_distance.hpp"
 #include "geom/exact_convex.hpp"
 #include "geom/half_space_pairs.hpp"
 #include "geom/place.hpp"
@@ -21,6 +22,23 @@
 namespace geomsrv {
 
 namespace {
+
+/// The other way round.
+void swap_bodies(CoreSeparation& s) {
+    std::swap(s.point_a, s.point_b);
+    s.normal = -s.normal;
+    for (int i = 0; i < s.witness.count; ++i) {
+        std::swap(s.witness.a[i], s.witness.b[i]);
+    }
+    for (int i = 0; i < s.simplex.count; ++i) {
+        std::swap(s.simplex.a[i], s.simplex.b[i]);
+    }
+}
+
+CoreSeparation swapped(CoreSeparation s) {
+    swap_bodies(s);
+    return s;
+}
 
 using Kernel = CoreSeparation (*)(const Placed& a, const Placed& b, bool penetration);
 
@@ -50,22 +68,32 @@ CoreSeparation unsupported(const Placed&, const Placed&, bool) {
     return out;
 }
 
+MaybeCurved body_of(const Placed& placed) {
+    return placed.curved ? MaybeCurved{&*placed.curved, nullptr} : MaybeCurved{nullptr, &placed.core};
+}
+CoreSeparation with_curved(const Placed& a, const Placed& b, bool deep) {
+    return curved_distance(body_of(a), body_of(b), deep);
+}
+CoreSeparation half_curved(const Placed& a, const Placed& b, bool deep) {
+    return b.curved ? swapped(curved_half_space(*b.curved, a.half_space, deep)) : unsupported(a, b, deep);
+}
+
 // Upper triangle only: the caller orders the pair.  Rows and columns as in ShapeKind.
 // clang-format off
 constexpr Kernel kBelow = nullptr;
 constexpr Kernel kUnsup = unsupported;
 constexpr Kernel kKernels[kShapeKinds][kShapeKinds] = {
-    /*              sphere         capsule          box         convex   half_space   cylinder cone    ellipsoid mesh    polygon */
-    /*sphere    */ {sphere_sphere, sphere_capsule,  sphere_box, general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*capsule   */ {kBelow,        capsule_capsule, general,    general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*box       */ {kBelow,        kBelow,          general,    general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*convex    */ {kBelow,        kBelow,          kBelow,     general, convex_half, kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*half_space*/ {kBelow,        kBelow,          kBelow,     kBelow,  half_half,   kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*cylinder  */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kUnsup,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*cone      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kUnsup, kUnsup,   kUnsup, kUnsup},
-    /*ellipsoid */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kUnsup,   kUnsup, kUnsup},
-    /*mesh      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kBelow,   kUnsup, kUnsup},
-    /*polygon   */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,  kBelow, kBelow,   kBelow, kUnsup},
+    /*              sphere         capsule          box         convex   half_space   cylinder     cone         ellipsoid    mesh    polygon */
+    /*sphere    */ {sphere_sphere, sphere_capsule,  sphere_box, general, convex_half, with_curved, with_curved, with_curved, kUnsup, kUnsup},
+    /*capsule   */ {kBelow,        capsule_capsule, general,    general, convex_half, with_curved, with_curved, with_curved, kUnsup, kUnsup},
+    /*box       */ {kBelow,        kBelow,          general,    general, convex_half, with_curved, with_curved, with_curved, kUnsup, kUnsup},
+    /*convex    */ {kBelow,        kBelow,          kBelow,     general, convex_half, with_curved, with_curved, with_curved, kUnsup, kUnsup},
+    /*half_space*/ {kBelow,        kBelow,          kBelow,     kBelow,  half_half,   half_curved, half_curved, half_curved, kUnsup, kUnsup},
+    /*cylinder  */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      with_curved, with_curved, with_curved, kUnsup, kUnsup},
+    /*cone      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,      with_curved, with_curved, kUnsup, kUnsup},
+    /*ellipsoid */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,      kBelow,      with_curved, kUnsup, kUnsup},
+    /*mesh      */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,      kBelow,      kBelow,      kUnsup, kUnsup},
+    /*polygon   */ {kBelow,        kBelow,          kBelow,     kBelow,  kBelow,      kBelow,      kBelow,      kBelow,      kBelow, kUnsup},
 };
 // clang-format on
 
@@ -83,18 +111,6 @@ static_assert(triangle_is_full(), "every pair of kinds has an entry above the di
 
 constexpr Kernel kernel_of(ShapeKind a, ShapeKind b) {
     return kKernels[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
-}
-
-/// The other way round.
-void swap_bodies(CoreSeparation& s) {
-    std::swap(s.point_a, s.point_b);
-    s.normal = -s.normal;
-    for (int i = 0; i < s.witness.count; ++i) {
-        std::swap(s.witness.a[i], s.witness.b[i]);
-    }
-    for (int i = 0; i < s.simplex.count; ++i) {
-        std::swap(s.simplex.a[i], s.simplex.b[i]);
-    }
 }
 
 /// What the shape is larger than its core by [m].
@@ -243,24 +259,29 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
         return LocalPair{place(a, {}, f, scratch), place(b, X_ab, f, scratch + 3 * a.count)};
     };
     const bool unbounded = a.kind == ShapeKind::half_space || b.kind == ShapeKind::half_space;
+    const bool curved = is_curved(a.kind) || is_curved(b.kind);
+    const ShapeKind first_kind = flip ? b.kind : a.kind;
     const auto solve = [&](const LocalPair& pair) {
         const Placed& first = flip ? pair.b : pair.a;
         const Placed& second = flip ? pair.a : pair.b;
         const bool has_core = kernel != kUnsup && kernel != half_half;
         // Half spaces are their own bounding volumes.
         if (wanted.tier == Tier::bound && has_core) {
-            return unbounded ? bounding_distance(first.core, second.half_space)
-                             : bounding_distance(first.core, second.core);
+            const bool plane_first = first_kind == ShapeKind::half_space;
+            return !unbounded    ? bounding_distance(first.core, second.core)
+                   : plane_first ? swapped(bounding_distance(second.core, first.half_space))
+                                 : bounding_distance(first.core, second.half_space);
         }
-        // Two of them have no size that single precision could be relative to.
-        if (wanted.tier == Tier::float32 && has_core) {
+        // Two of them have no size that single precision could be relative to; supports of curved bodies are
+        // found in double.
+        if (wanted.tier == Tier::float32 && has_core && !curved) {
             return unbounded ? single_distance(first.core, second.half_space, wanted.penetration)
                              : single_distance(first.core, second.core, wanted.penetration);
         }
         return kernel(first, second, wanted.penetration);
     };
     const auto magnitude = [&] { return std::max(magnitude_of(a, {}), magnitude_of(b, X_ab)); };
-    if (wanted.tier == Tier::exact && kernel != kUnsup && !unbounded) {
+    if (wanted.tier == Tier::exact && kernel != kUnsup && !unbounded && !curved) {
         const Transform X_a;
         const ExactBody exact_a = exact_body(a, X_a);
         const ExactBody exact_b = exact_body(b, X_ab);
@@ -286,8 +307,9 @@ Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transfor
 Separation world_distance(const WorldBody& a, const WorldBody& b, const Wanted& wanted, double* scratch) {
     const auto pose = [](const WorldBody& body) { return Transform{{}, body.origin}; };
     const auto placed = [&](const WorldBody& body, const LocalFrame& f, double* memory) {
-        return body.is_box ? Placed{place_box(body.box.center, body.box.axes, body.box.half_extents, f), {}}
-                           : place(body.hull, pose(body), f, memory);
+        return body.is_box
+                   ? Placed{place_box(body.box.center, body.box.axes, body.box.half_extents, f), {}, {}}
+                   : place(body.hull, pose(body), f, memory);
     };
     const auto magnitude = [&](const WorldBody& body) {
         return body.is_box ? std::max(largest_of(body.box.center), largest_of(body.box.half_extents))

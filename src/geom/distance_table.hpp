@@ -20,7 +20,8 @@ constexpr std::size_t scratch_size(const ShapeView& a, const ShapeView& b) {
 /// depth where `wanted`.  Unsupported pairs answer NaN.
 ///
 /// Tier exact rounds correctly for polytopes.  Of spheres and capsules the core is exact and the radii are
-/// taken off outwards; half spaces are answered as at float64, to which their normals are rounded.
+/// taken off outwards; half spaces and curved bodies are answered as at float64, to which normals and
+/// supports are rounded.
 Separation shape_distance(const ShapeView& a, const ShapeView& b, const Transform& X_ab, const Wanted& wanted,
                           double* scratch);
 

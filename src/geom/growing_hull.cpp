@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <type_traits>
 
 #include "geom/double_double.hpp"
 #include "geom/hull_surface.hpp"
@@ -19,6 +20,11 @@ namespace {
 // visited.  Two concentric hulls of 500 random points on a sphere take about 250.  The bounds hold wherever
 // the work ends.
 constexpr int kMaxVertices = 2000;
+
+// Of curved bodies a few hundred bring the bounds together, unless the boundary of K is equally near all
+// around: then no number would do.
+template <class Body>
+constexpr int kMostVertices = std::is_same_v<Body, SupportedCore> ? 600 : kMaxVertices;
 
 // Vertices of K are differences of rounded vertices, rounded once more.
 constexpr double kDifferenceError = 2 * kVertexError + 2 * kUnitRoundoff;
@@ -73,7 +79,7 @@ public:
                 reach = support;
                 best = f;
             }
-            if (reach - inner <= kMet * size_ || static_cast<int>(vertices_.size()) >= kMaxVertices) {
+            if (reach - inner <= kMet * size_ || static_cast<int>(vertices_.size()) >= kMostVertices<Body>) {
                 break;
             }
             if (side(facets_[at(f)], v) <= 0) {
@@ -90,6 +96,11 @@ public:
         }
         out.iterations = static_cast<int>(vertices_.size());
         out.normal = -facets_[at(best)].normal;
+        if constexpr (std::is_same_v<Body, SupportedCore>) {
+            if (inner <= kMet * size_ && reach - inner > kMet * size_) {
+                between_facets(reach, out.normal);
+            }
+        }
         // Proven only if the surface winds round the origin, which the sign of the nearest facet says for
         // all.
         out.upper = inner > 0.0 ? -(inner - kOff * size_) : 0.0;
@@ -101,6 +112,25 @@ public:
     }
 
 private:
+    /// Where a tip of K is the origin, or all but, the normals of the facets around it are the outermost of
+    /// those that part the bodies, and the curved boundary bulges beyond them; one between them all does
+    /// better.
+    void between_facets(double reach, Vec3& normal) {
+        Vec3 sum;
+        for (const HullFacet& f : facets_) {
+            if (f.alive && f.offset - f.error <= kMet * size_) {
+                sum = sum + f.normal;
+            }
+        }
+        if (!(norm(sum) > kThin)) {
+            return;
+        }
+        const Vec3 mean = normalized(sum);
+        if (highest(b_, mean).value - lowest(a_, mean).value < reach) {
+            normal = -mean;
+        }
+    }
+
     /// Vertex of K from one of each core.
     HullVertex difference(int index_a, int index_b) const {
         HullVertex v{index_a, index_b, vertex_of(a_, index_a), vertex_of(b_, index_b), {}};
@@ -278,6 +308,10 @@ NearestFacet nearest_facet(const Core& a, const Core& b, const Witness& seed) {
 
 NearestFacet nearest_facet(const SingleCore& a, const SingleCore& b, const Witness& seed) {
     return GrowingHull<SingleCore>(a, b).nearest(seed);
+}
+
+NearestFacet nearest_facet(const SupportedCore& a, const SupportedCore& b, const Witness& seed) {
+    return GrowingHull<SupportedCore>(a, b).nearest(seed);
 }
 
 }  // namespace geomsrv

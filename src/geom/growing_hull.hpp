@@ -18,6 +18,7 @@
 // case of its own.
 #pragma once
 
+#include "geom/curved.hpp"
 #include "geom/separation.hpp"
 #include "geom/single_core.hpp"
 
@@ -37,5 +38,6 @@ struct NearestFacet {
 /// Facet of K nearest to the origin; `seed` are vertices of K to start from, best if they hold the origin.
 NearestFacet nearest_facet(const Core& a, const Core& b, const Witness& seed);
 NearestFacet nearest_facet(const SingleCore& a, const SingleCore& b, const Witness& seed);
+NearestFacet nearest_facet(const SupportedCore& a, const SupportedCore& b, const Witness& seed);
 
 }  // namespace geomsrv

@@ -70,6 +70,10 @@ CoreSeparation convex_half_space(const SingleCore& a, const PlacedHalfSpace& b, 
     return body_half_space(a, b, penetration);
 }
 
+CoreSeparation convex_half_space(const SupportedCore& a, const PlacedHalfSpace& b, bool penetration) {
+    return body_half_space(a, b, penetration);
+}
+
 CoreSeparation half_space_half_space(const PlacedHalfSpace& a, const PlacedHalfSpace& b) {
     const double length_a = norm(a.normal);
     const double length_b = norm(b.normal);

@@ -3,6 +3,7 @@
 // Signed distance of a half space and anything.
 #pragma once
 
+#include "geom/curved.hpp"
 #include "geom/separation.hpp"
 #include "geom/single_core.hpp"
 
@@ -23,6 +24,9 @@ CoreSeparation convex_half_space(const Core& a, const PlacedHalfSpace& b, bool p
 
 /// In single precision; the plane is as it is, in double.
 CoreSeparation convex_half_space(const SingleCore& a, const PlacedHalfSpace& b, bool penetration);
+
+/// Of a curved body by its support.
+CoreSeparation convex_half_space(const SupportedCore& a, const PlacedHalfSpace& b, bool penetration);
 
 /// Half spaces that face each other: the gap between their planes, or minus the thickness of what they share.
 /// All others share an unbounded part and cannot be parted: distance -infinity, no normal.

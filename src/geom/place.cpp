@@ -110,6 +110,35 @@ PlacedHalfSpace place_half_space(const ShapeView& shape, const Transform& X_ls, 
             std::abs(offset.lo) + wide_error * size};
 }
 
+/// Supports round as kCurvedCoarseness says, so that only the center and the half sizes have errors of their
+/// own; those are scaled by a power of two.
+void place_curved(const ShapeView& shape, const Mat3& rotation, const Rounded& center, double scale,
+                  Placed& out) {
+    CurvedBody& body = out.curved.emplace();
+    body.kind = shape.kind;
+    body.center = center.value;
+    body.rotation = rotation;
+    const bool oval = shape.kind == ShapeKind::ellipsoid;
+    body.half[0] = scale * shape.params[0];
+    body.half[1] = oval ? scale * shape.params[1] : body.half[0];
+    body.half[2] = scale * shape.params[oval ? 2 : 1];
+    const double spread = oval ? largest_of({body.half[0], body.half[1], body.half[2]})
+                               : safe_norm({body.half[0], body.half[2], 0.0});
+    body.spread = spread * (1.0 + kRotationStretch) * kRoundedUp;
+    body.error = center.error;
+    const double middle = safe_norm(body.center);
+    body.reach = (middle + body.spread) * kRoundedUp;
+    Core& box = out.core;
+    box.center = body.center;
+    box.generators = 3;
+    for (int i = 0; i < 3; ++i) {
+        box.generator[i] = body.half[i] * column(rotation, i);
+    }
+    const double most = (body.half[0] + body.half[1] + body.half[2]) * (1.0 + kRotationStretch);
+    box.reach = (middle + most) * kRoundedUp;
+    box.error = center.error + kUnitRoundoff * most;
+}
+
 void place_hull(const ShapeView& shape, const Transform& X_ls, const LocalFrame& frame, double* scratch,
                 Core& core) {
     const HullExtent extent = shape.extent != nullptr ? *shape.extent : extent_of(shape);
@@ -192,7 +221,11 @@ double magnitude_of(const ShapeView& shape, const Transform& X_ls) {
         case ShapeKind::capsule:
             return std::max(largest, shape.params[1]);
         case ShapeKind::box:
+        case ShapeKind::ellipsoid:
             return std::max(largest, largest_of({shape.params[0], shape.params[1], shape.params[2]}));
+        case ShapeKind::cylinder:
+        case ShapeKind::cone:
+            return std::max(largest, largest_of({shape.params[0], shape.params[1], 0.0}));
         case ShapeKind::half_space:
             return std::max(largest, std::abs(shape.params[3]));
         case ShapeKind::convex: {
@@ -218,6 +251,10 @@ Placed place(const ShapeView& shape, const Transform& X_ls, const LocalFrame& fr
     const bool turned = !is_identity(X_ls.rotation);
     const Rounded center = relative({}, X_ls, frame, turned);
     core.center = center.value;
+    if (is_curved(shape.kind)) {
+        place_curved(shape, X_ls.rotation, center, frame.scale, out);
+        return out;
+    }
     double spread = 0.0;
     if (shape.kind == ShapeKind::box) {
         core.generators = 3;

@@ -4,7 +4,10 @@
 // rounding.
 #pragma once
 
+#include <optional>
+
 #include "geom/core.hpp"
+#include "geom/curved.hpp"
 #include "geom/exact_body.hpp"
 #include "geom/half_space_pairs.hpp"
 #include "geom/shape.hpp"
@@ -13,8 +16,9 @@ namespace geomsrv {
 
 /// A shape in the local frame of its pair.
 struct Placed {
-    Core core;                   ///< unless it is a half space
-    PlacedHalfSpace half_space;  ///< if it is one
+    Core core;                         ///< unless it is a half space; of a curved body a box around it
+    PlacedHalfSpace half_space;        ///< if it is one
+    std::optional<CurvedBody> curved;  ///< if it is one
 };
 
 /// Axes of the first shape (or the world), another origin, another unit of length.

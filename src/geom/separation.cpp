@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geom/curved.hpp"
 #include "geom/single_core.hpp"
 
 namespace geomsrv {
@@ -78,8 +79,10 @@ CoreSeparation certify_deep(const Body& a, const Body& b, Vec3 normal, Vec3 poin
 
 template CoreSeparation certify_apart(const Core&, const Core&, Vec3, Vec3, Vec3);
 template CoreSeparation certify_apart(const SingleCore&, const SingleCore&, Vec3, Vec3, Vec3);
+template CoreSeparation certify_apart(const SupportedCore&, const SupportedCore&, Vec3, Vec3, Vec3);
 template CoreSeparation certify_deep(const Core&, const Core&, Vec3, Vec3, Vec3, double);
 template CoreSeparation certify_deep(const SingleCore&, const SingleCore&, Vec3, Vec3, Vec3, double);
+template CoreSeparation certify_deep(const SupportedCore&, const SupportedCore&, Vec3, Vec3, Vec3, double);
 
 void unscale(CoreSeparation& s, double scale) {
     if (scale == 1.0) {

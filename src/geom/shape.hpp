@@ -19,12 +19,17 @@ enum class ShapeKind : std::uint8_t {
     convex,      ///< hull of `vertices`; params: how far each listed vertex may be from the one meant [m],
                  ///< usually 0
     half_space,  ///< params: unit normal (to a few ulps), offset; solid where normal . x <= offset
-    cylinder,
-    cone,
-    ellipsoid,
+    cylinder,    ///< params: radius, half length; axis z
+    cone,        ///< params: radius, half length; apex on +z
+    ellipsoid,   ///< params: half axes
     mesh,
     polygon,
 };
+
+/// Known by supports and not by vertices, see curved.hpp.
+constexpr bool is_curved(ShapeKind kind) {
+    return kind == ShapeKind::cylinder || kind == ShapeKind::cone || kind == ShapeKind::ellipsoid;
+}
 
 inline constexpr const char* kShapeNames[] = {"sphere",   "capsule", "box",       "convex", "half_space",
                                               "cylinder", "cone",    "ellipsoid", "mesh",   "polygon"};
