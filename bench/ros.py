@@ -25,6 +25,7 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 READY_DEADLINE_S = 20.0
 SHAPES = 1000
 RATE_HZ = 100.0
+IDLE_SHARE = 0.03  # of a core that an idle node may take
 
 
 def serve() -> None:
@@ -177,8 +178,8 @@ def _memory(client: Client, pid: int, calls: int) -> str:
     return f"memory over {calls:,} calls: {before:.1f} MiB before, {after:.1f} MiB after ({after - before:+.2f})"
 
 
-def _stream(client: Client, pid: int, seconds: float) -> str:
-    """States of 1,000 shapes at 100 Hz: what arrived, and what it cost the node."""
+def _stream(client: Client, pid: int, seconds: float) -> list[str]:
+    """States of 1,000 shapes at 100 Hz, that change and that do not: what arrived, and what it cost the node."""
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
     from geomsrv import msg
@@ -212,21 +213,25 @@ def _stream(client: Client, pid: int, seconds: float) -> str:
         topic = next(i for i, name in enumerate(state.input_topics) if name.endswith("states"))
         return int(state.input_received[topic])
 
-    begin_received, (begin_cpu, _), begin = received(), _usage(pid), time.monotonic()
-    count = int(seconds * RATE_HZ)
-    for k in range(count):
-        message.poses[2] = 1e-3 * k
-        message.header.stamp = client.node.get_clock().now().to_msg()
-        states.publish(message)
-        while (wait := begin + (k + 1) / RATE_HZ - time.monotonic()) > 0.0:
-            client._executor.spin_once(timeout_sec=wait)
-    cpu = (_usage(pid)[0] - begin_cpu) / (time.monotonic() - begin)
-    try:
-        client.until(lambda: received() - begin_received >= count)
-    except RuntimeError:
-        pass
-    arrived = received() - begin_received
-    return f"states, {SHAPES:,} shapes at {RATE_HZ:g} Hz: {arrived} of {count} arrived, {cpu:.0%} of a core"
+    def run(changing: bool) -> str:
+        settle = time.monotonic() + (0.0 if changing else 2.0)  # it takes a while to see that nothing changes
+        while time.monotonic() < settle:
+            states.publish(message)
+            client._executor.spin_once(timeout_sec=1.0 / RATE_HZ)
+        begin_received, (begin_cpu, _), begin = received(), _usage(pid), time.monotonic()
+        count = int(seconds * RATE_HZ)
+        for k in range(count):
+            message.poses[2] = 1e-3 * k * changing
+            message.header.stamp = client.node.get_clock().now().to_msg()
+            states.publish(message)
+            while (wait := begin + (k + 1) / RATE_HZ - time.monotonic()) > 0.0:
+                client._executor.spin_once(timeout_sec=wait)
+        cpu = (_usage(pid)[0] - begin_cpu) / (time.monotonic() - begin)
+        client.until(lambda: received() > begin_received)
+        what = "changing" if changing else f"unchanged, wanted under {IDLE_SHARE:.0%}"
+        return f"states, {SHAPES:,} shapes at {RATE_HZ:g} Hz, nobody listens, {what}: {cpu:.1%} of a core"
+
+    return [run(True), run(False)]
 
 
 def measure(quick: bool) -> list[str]:
@@ -237,7 +242,7 @@ def measure(quick: bool) -> list[str]:
         try:
             lines = _latency(client, 100 if quick else 1000)
             lines.append(_memory(client, server.pid, 1_000 if quick else 10_000))
-            lines.append(_stream(client, server.pid, 3.0 if quick else 10.0))
+            lines += _stream(client, server.pid, 3.0 if quick else 10.0)
             return lines
         finally:
             client.close()

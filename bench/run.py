@@ -35,6 +35,8 @@ import geomsrv as gs  # noqa: E402
 
 Call = Callable[[], object]
 
+TREMBLE = 2.0**-30  # [m] so that every step is one in which everything moved
+
 DRIVE = np.array([0.5, 0.0, 0.4])  # a robot's twist
 
 
@@ -167,6 +169,7 @@ def _scene_scenarios(n: int) -> list[Scenario]:
 
     def step() -> object:
         scene.set_states(ids, poses)
+        scene.forget()
         return scene.distances(0.02)
 
     return [Scenario(f"scene step, {n:,} boxes, pairs within 2 cm", None, (step, n)), _crowd()]
@@ -187,6 +190,7 @@ def _crowd() -> Scenario:
     ids = scene.ids
 
     def step() -> object:
+        poses[:, 0] += TREMBLE
         scene.set_states(ids, poses, twists)
         return scene.first_contacts(horizon)
 
@@ -276,6 +280,65 @@ def prices(quick: bool) -> list[Price]:
     return table
 
 
+def effects(quick: bool) -> list[Price]:
+    """What does not happen in a scene, as a share of the cost of a scene in which it does."""
+    n = 1_000 if quick else 10_000
+    rng = np.random.default_rng(scenarios.SEED)
+    side = (n * 0.4) ** (1 / 3)
+    poses = scenarios.relative_poses(n, 0.0, 1.0)
+    poses[:, :3] = rng.uniform(0.0, side, (n, 3))
+    moving = np.hstack([0.2 * rng.normal(size=(n, 3)), 0.2 * rng.normal(size=(n, 3)) * (rng.random((n, 1)) < 0.1)])
+    boxes = [gs.Box(h) for h in rng.uniform(0.05, 0.2, (n, 3))]
+    camera = gs.Frustum([0, 0, -1], np.eye(3), 1.0, 1.0, 0.1, 10.0)
+
+    def world(twists: np.ndarray) -> gs.Scene:
+        scene = gs.Scene()
+        rows = zip(boxes, poses, twists, strict=True)
+        scene.apply(gs.SceneUpdate(add=[gs.SceneObject(str(i), s, p, v) for i, (s, p, v) in enumerate(rows)]))
+        return scene
+
+    def step(scene: gs.Scene, ids: tuple[str, ...], here: np.ndarray, twists: np.ndarray) -> None:
+        here[:, 0] += TREMBLE
+        scene.set_states(ids, here, twists)
+        scene.distances(0.05)
+        scene.first_contacts(1.0)
+        scene.cull(camera)
+
+    busy, calm, sliding = world(moving), world(np.zeros_like(moving)), world(moving * [1, 1, 1, 0, 0, 0])
+    name, one = calm.ids[:1], poses[[int(calm.ids[0])]]
+    order = np.array([int(i) for i in busy.ids])
+    here = poses[order].copy()
+
+    def slide(rotation: bool) -> None:
+        sliding.forget()
+        sliding.first_contacts(1.0, rotation=rotation)
+
+    return [
+        Price(
+            f"one of {n:,} boxes moves, to all",
+            0.02,
+            n,
+            lambda: step(busy, busy.ids, here, moving[order]),
+            lambda: step(calm, name, one, moving[:1]),
+        ),
+        Price(
+            "nothing moves, to all",
+            0.02,
+            n,
+            lambda: step(busy, busy.ids, here, moving[order]),
+            lambda: _rest(calm, camera),
+        ),
+        Price("nothing turns, to no rotation stage", 1.02, n, lambda: slide(False), lambda: slide(True)),
+    ]
+
+
+def _rest(scene: gs.Scene, camera: gs.Frustum) -> None:
+    """A step in which nothing moved."""
+    scene.distances(0.05)
+    scene.first_contacts(1.0)
+    scene.cull(camera)
+
+
 def verifications_per_second(quick: bool) -> float:
     """How many certificates the independent checker proves in a second, of all queries together."""
     few = 100 if quick else 500
@@ -337,10 +400,15 @@ def print_steps(console: Console, hits: int, table: list[Stepped]) -> None:
     console.print(out)
 
 
-def print_prices(console: Console, table: list[Price]) -> None:
+PRICES = "Price of exactness and of proof: ratio to the same query at float64, in one run", "float64", "stronger"
+EFFECTS = "Only the effects a scene calls for: a step, distances and contacts and view, per object", "whole", "this"
+
+
+def print_prices(console: Console, table: list[Price], words: tuple[str, str, str] = PRICES) -> None:
     """Ratios and wishes."""
-    out = Table(title="Price of exactness and of proof: ratio to the same query at float64, in one run")
-    for heading in ("query", "items", "float64 ns", "stronger ns", "ratio", "wanted"):
+    title, plain, stronger = words
+    out = Table(title=title)
+    for heading in ("query", "items", f"{plain} ns", f"{stronger} ns", "ratio", "wanted"):
         out.add_column(heading, justify="left" if heading == "query" else "right")
     for p in table:
         wish = f"{p.most:g}" + ("" if p.most_ns is None else f", {p.most_ns:g} ns")
@@ -350,7 +418,7 @@ def print_prices(console: Console, table: list[Price]) -> None:
             f"{p.items:,}",
             f"{p.ns[0]:,.1f}",
             f"{p.ns[1]:,.1f}",
-            f"{ratio:.2f}",
+            f"{ratio:.3f}",
             f"{wish} {'met' if p.met else 'MISSED'}",
         )
     console.print(out)
@@ -387,6 +455,11 @@ def main() -> None:
         price.run(3 if arguments.quick else 9)
     if paid:
         print_prices(console, paid)
+    shares = [p for p in effects(arguments.quick) if arguments.only in p.name or arguments.only == "effects"]
+    for share in shares:
+        share.run(5 if arguments.quick else 15)
+    if shares:
+        print_prices(console, shares, EFFECTS)
     if arguments.only in "fixed steps":
         print_steps(console, *fixed_steps(arguments.quick))
     if arguments.only in "verify":
@@ -402,6 +475,7 @@ def main() -> None:
             "python": platform.python_version(),
             "scenarios": {s.name: s.median_ns for s in table},
             "prices": {p.name: p.ns for p in paid},
+            "effects": {p.name: p.ns for p in shares},
             "node": [str(line) for line in node],
         }
         arguments.json.write_text(json.dumps(record, indent=2) + "\n")

@@ -602,6 +602,7 @@ class Asked:
 
         def run() -> Any:
             scene.set_states(ids, crowd.poses)
+            scene.forget()  # every step is one in which everything moved
             return self.ask(crowd, scene, how)
 
         return Call(run, partial(self.read, crowd))

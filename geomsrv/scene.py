@@ -453,7 +453,7 @@ class Scene:
         Returns
         -------
         int
-            The version after it; the same as before if the very same states were set last.
+            The new version.
 
         Raises
         ------
@@ -467,9 +467,10 @@ class Scene:
             rows = self._resolve(ids, world)
             poses = _array(poses, "poses", (len(rows), 7))
             twists = None if twists is None else _array(twists, "twists", (len(rows), 6))
-            if self._repeats(rows, poses, twists, world):
+            if len(rows) and self._repeats(rows, poses, twists, world):
+                self._version += 1
                 self._stamp = stamp if stamp is not None else self._stamp
-                self._world = world.stamped(self._stamp)
+                self._world = world.seen_again(self._version, self._stamp)
                 self._newest = (*self._newest[:3], self._world)
                 return self._version
             given = poses.copy(), None if twists is None else twists.copy()
@@ -742,6 +743,10 @@ class Scene:
             world.version,
             world.stamp,
         )
+
+    def forget(self) -> None:
+        """Drop what is remembered of earlier answers: the next ones are found anew, and are the same."""
+        self._memory = Memory()
 
     def plan(self) -> str:
         """In words, line by line: what each query computes for what is in the scene, and what is skipped and why."""

@@ -266,10 +266,11 @@ class World:
         world.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
         return world
 
-    def stamped(self, stamp: Any) -> World:
-        """The same version, seen again at another time."""
+    def seen_again(self, version: int, stamp: Any) -> World:
+        """The same at another time."""
         world = object.__new__(World)
-        world.__dict__.update(self.__dict__, stamp=stamp)
+        history = (*self.history[1 - HISTORY :], (version, np.zeros(0, np.int64)))
+        world.__dict__.update(self.__dict__, version=version, stamp=stamp, history=history)
         return world
 
     def changed_since(self, old: World) -> BoolArray | None:

@@ -63,6 +63,7 @@ verify_record(record)
 Scene(*, fixed_frame='world', allowed_pairs=(), transforms=None)
 Scene.apply(self, update)
 Scene.plan(self)
+Scene.forget(self)
 """.replace("\n    ", " ").splitlines()
 
 ATTRIBUTES = {

@@ -148,14 +148,19 @@ def test_the_very_same_states_are_no_change(rng) -> None:
     names, where = tuple(scene.ids), np.array([scene[x].pose for x in scene])
     version = scene.set_states(names, where, None, stamp="first")
     answer = scene.distances(1.0)
-    assert scene.set_states(names, where.copy(), None, stamp="second") == version
+    assert scene.set_states(names, where.copy(), None, stamp="second") == version + 1
+    assert scene.distances(1.0).cost.counts["candidates"] == 0
     later = scene.distances(1.0)
     assert (answer.stamp, later.stamp) == ("first", "second") and columns(answer) == columns(later)
+    before = scene.world
     twists = np.array([scene[x].twist for x in scene])
-    assert scene.set_states(names, where, twists) == version + 1, "velocities without uncertainty are a statement"
-    assert scene.set_states(names, where, twists) == version + 1
+    scene.set_states(names, where, twists)  # velocities without uncertainty are a statement
+    sure = scene.world
+    scene.set_states(names, where, twists)
+    assert scene.world.poses is sure.poses is before.poses and scene.world.version == version + 3
+    assert not sure.velocity_uncertainty.any()
     scene.apply(gs.SceneUpdate(remove=[names[0]]))
-    assert scene.set_states(names[1:], where[1:]) == version + 3
+    assert scene.set_states(names[1:], where[1:]) == version + 5
 
 
 def test_answers_cannot_be_changed(rng) -> None:

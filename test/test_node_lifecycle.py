@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import array
 import time
 
 import pytest
@@ -318,6 +319,44 @@ def test_what_nobody_listens_to_is_not_computed(client) -> None:
         counted = counters(version)
         assert counted["contact"] > 0 and counted["penetration"] > 0 and counted.get("distance", 0) == 0
         assert counted.get("first_contact", 0) == 0, "nothing moves"
+
+
+def test_states_that_say_the_same_wake_nobody_up(client) -> None:
+    """They are not looked at while nobody listens, yet requests and new subscribers get the newest."""
+
+    def gap() -> float:
+        return client.call(srv.Distance, "distance", select=2, max_distance=20.0).distance[0]
+
+    def at(seconds: int, place: float) -> msg.ShapeStates:
+        said = msg.ShapeStates(ids=["a", "b"], ids_key=3)
+        said.poses = array.array("d", [0.0, 0, 0, 0, 0, 0, 1, place, 0, 0, 0, 0, 0, 1])
+        said.header.stamp.sec = seconds
+        return said
+
+    with running_node(max_rate=1000.0, idle_rate=1.0) as running:
+        group, record = running.node._states_group, running.node._inputs.records["states"]
+        moved = client.publisher(msg.ShapeStates, "states", dict((topic.name, topic.qos) for topic in INPUTS)["states"])
+        update = msg.SceneUpdate(add=[body("a", gs.Sphere(0.5)), body("b", gs.Sphere(0.5), (9, 0, 0))])
+        client.call(srv.ApplyScene, "apply_scene", update=update)
+        for seconds, place in ((1, 6.0), (2, 5.0)):
+            said = at(seconds, place)
+
+            def dozes(said: msg.ShapeStates = said) -> bool:
+                moved.publish(said)
+                return group.asleep
+
+            client.until(dozes, "it dozes off")
+        before = record.received
+        for _ in range(50):
+            moved.publish(said)
+        assert gap() == 4.0 and record.received <= before + 5, "most were not looked at"
+        moved.publish(at(3, 4.0))
+        client.until(lambda: gap() == 3.0, "a request looks")
+        client.until(lambda: not group.asleep, "what is new wakes it up")
+        inbox = client.listen(msg.DistanceArray, "distances", 10)
+        inbox.wait(lambda m: m.header.stamp.sec == 3)
+        moved.publish(at(4, 3.0))
+        inbox.wait(lambda m: m.header.stamp.sec == 4)
 
 
 def test_evaluations_are_paced(client) -> None:
