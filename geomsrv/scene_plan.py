@@ -62,9 +62,8 @@ def _first_contacts(world: World) -> list[str]:
     elif not world.turns.any():
         lines.append("- rotation: skipped, no shape has angular velocity")
     if rolling := int((sliding & spinning & ~known)[solids].sum()):
-        lines.append(
-            f"- followed step by step, at tier float64: {_count(rolling, 'sphere or capsule', 'spheres and capsules')}"
-        )
+        listed = _count(rolling, "round body or plane", "round bodies and planes")
+        lines.append(f"- followed step by step, at tier float64: {listed}")
     if lost := int((world.turns & ~spinning)[polygons].sum()):
         lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
     strange = int((moving & ~(known & sliding) & ~spinning)[solids].sum())

@@ -19,6 +19,7 @@ from itertools import product
 import numpy as np
 
 from geomsrv import _core, _validate
+from geomsrv.advancement import advance
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray, gather
 from geomsrv.broad_phase import entry_times
 from geomsrv.errors import GeometryError, NotAvailableError
@@ -54,7 +55,10 @@ CAPSULE_ROUNDING = 16.0 * ROUNDOFF
 SWITCHED_OFF = "first contact of what turns is switched off"
 NO_APPROACH = "first contact at a distance ({}) is unsupported"
 
-FOLLOWED = ("sphere", "capsule", "box", "convex")  #: solids with a kernel, beside polygons
+FOLLOWED = _core.shape_kinds()[:8]  #: solids that are followed, beside polygons
+
+#: Solids that are followed by looks at their distance, with others and among themselves but for half spaces.
+BY_DISTANCE = ("half_space", "cylinder", "cone", "ellipsoid")
 
 
 @dataclass(frozen=True)
@@ -188,8 +192,22 @@ def _followed(world: World, pairs: IntArray, question: Question) -> BoolArray:
         return nothing
     turns = world.turns[pairs].any(axis=1)
     stepwise = (turns & question.rotation) | (~turns & _rolling(world, pairs))
-    followed: BoolArray = stepwise & followed_in_turning(world)[pairs].all(axis=1)
+    followed: BoolArray = stepwise & _followed_in_pairs(world, pairs)
     return followed
+
+
+def _followed_in_pairs(world: World, pairs: IntArray) -> BoolArray:
+    """(k,) bool: pairs that can be followed while they turn; two half spaces meet far away whatever they do."""
+    unbounded = world.table.unbounded[world.shape[pairs]].all(axis=1)
+    followed: BoolArray = followed_in_turning(world)[pairs].all(axis=1) & ~unbounded
+    return followed
+
+
+def _by_distance(world: World, pairs: IntArray) -> BoolArray:
+    """(k,) bool: pairs of which one is curved or a half space."""
+    codes = [code for code, name in enumerate(_core.shape_kinds()) if name in BY_DISTANCE]
+    found: BoolArray = np.isin(world.kinds, codes)[pairs].any(axis=1)
+    return found
 
 
 FEW = 64  # pairs that are looked at before it is asked whether others can be earlier; from then on twice as many
@@ -245,8 +263,10 @@ def _approaches(
 ) -> tuple[ContactRows, Unsupported]:
     """When bodies come as near as the margin: a ball that large is added to one of them."""
     horizon = question.horizon
-    followed = followed_in_turning(world)[pairs].all(axis=1)
+    followed = _followed_in_pairs(world, pairs)
     followed &= question.rotation | ~world.turns[pairs].any(axis=1)
+    # Distances at rest need no looks, and the pair is near for as long as is asked.
+    followed &= ~(_by_distance(world, pairs) & at_rest(world, pairs, horizon))
     count_kinds(world, pairs[followed], counts)
     rows = [_turning_contacts(world, pairs[followed], question)] if followed.any() else []
     others = pairs[~followed]
@@ -311,7 +331,7 @@ def _turning_contacts(world: World, pairs: IntArray, question: Question) -> Cont
         upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
     # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
     radius = _radius(world)[pairs]
-    uneven = np.flatnonzero(radius[:, 0] != radius[:, 1])
+    uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
     point[uneven] += 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
     points = np.empty(len(pairs), dtype=object)
     for k in np.flatnonzero(~np.isnan(point[:, 0])).tolist():
@@ -328,11 +348,15 @@ def _ask(
     count = len(pairs)
     status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
     normal, point = np.zeros((count, 3)), np.zeros((count, 3))
+    looked = _by_distance(world, pairs)
+    if looked.any():
+        answer = advance(world, pairs[looked], question.horizon, question.tolerance, slack[looked])
+        status[looked], lower[looked], upper[looked], normal[looked], point[looked] = answer
     planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
     motion = np.column_stack([world.twists, world.poses[:, :3]])
     motion[world.planar, 8] = 0.0
     for flat, *is_box in product((True, False), repeat=3):
-        part = (planar == flat) & (boxes == is_box).all(axis=1)
+        part = (planar == flat) & (boxes == is_box).all(axis=1) & ~looked
         if not part.any():
             continue
         side_a, side_b = (_side(world, pairs[part, k], flat, is_box[k]) for k in range(2))
@@ -378,6 +402,8 @@ def _slack(world: World, pairs: IntArray, nearness: float) -> FloatArray:
     corners = np.where(world.kinds == names.index("convex"), params[:, 0], 0.0)  # rounded ones, of a frustum
     size = np.abs(world.poses[:, :3]).sum(axis=1) + world.table.reach[world.shape]
     ends = np.where(world.kinds == names.index("capsule"), CAPSULE_ROUNDING * size, 0.0)
-    margin = _radius(world)[pairs].sum(axis=1) + nearness
+    looked = _by_distance(world, pairs)  # at the bodies as they are, not at cores
+    margin = np.where(looked, 0.0, _radius(world)[pairs].sum(axis=1)) + nearness
     off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + 2.0 * ROUNDOFF * margin
+    off = np.where(looked, 2.0 * ROUNDOFF * nearness, off)
     return np.column_stack([margin, off, np.zeros(len(pairs))])

@@ -490,8 +490,8 @@ def test_solids_that_turn():
     # Out of reach for ever, and what no kernel follows.
     far = scene_of([spinning("bar", bar), gs.SceneObject("ball", gs.Sphere(0.5), at(0.0, 3.0, 0.0))])
     assert len(far.first_contacts(INF)) == 0
-    cone = scene_of([spinning("bar", bar), gs.SceneObject("cone", gs.Cone(0.5, 1.0), at(0.0, 1.5, 0.0))])
-    assert cone.first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
+    sheet = scene_of([spinning("bar", bar), gs.SceneObject("sheet", SHEET, at(0.0, 1.5, 0.0))])
+    assert sheet.first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
     # Turning alike is not being at rest relative to each other: each turns about its own origin.
     for away, statuses in ((0.3, []), (1.5, [ContactStatus.WILL_TOUCH]), (5.0, [])):
         alike = scene_of([spinning("a", bar), spinning("b", bar, at(0.0, away, 0.0), spin=(0.0, 0.0, 1.0))])
@@ -1285,11 +1285,13 @@ def test_plan_says_what_is_computed_and_what_is_not():
     assert "nothing moves, nothing is swept" in scene.plan() and "unsupported" not in scene.plan()
     scene.set_states(["a"], [IDENTITY], [(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)])
     assert "boxes swept for 1 moving object" in scene.plan()
-    assert "followed step by step, at tier float64: 1 sphere or capsule" in scene.plan()
+    assert "followed step by step, at tier float64: 1 round body or plane" in scene.plan()
     assert "2 solids (sphere 2)" in scene.plan()
     push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     boxes = [gs.SceneObject(name, gs.Box((1.0, 1.0, 1.0)), at(5.0 * k, 0.0, 0.0), push) for k, name in enumerate("xyz")]
     scene = scene_of(boxes)
     assert "followed in translation: 3 boxes and hulls" in scene.plan() and "unsupported" not in scene.plan()
     scene.apply(gs.SceneUpdate(add=[gs.SceneObject("floor", gs.HalfSpace((0.0, 0.0, 1.0), -9.0))]))
+    assert "unsupported" not in scene.plan()
+    scene.apply(gs.SceneUpdate(add=[gs.SceneObject("sheet", SHEET, at(0.0, 0.0, 50.0))]))
     assert "unsupported unless in contact now: boxes and hulls that move, against solids of other kinds" in scene.plan()

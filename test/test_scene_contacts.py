@@ -116,8 +116,11 @@ def test_margin_without_motion():
             assert answer.time_upper[0] == 0.0 or status == ContactStatus.TOUCHING
             np.testing.assert_allclose(answer.points, [[0, 0, (height - 0.5) / 2]])
     falling = gs.SceneObject("ball", gs.Sphere(0.5), [0, 0, 2.0, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0])
-    answer = scene_of([floor, falling]).first_contacts(1.0, margin=0.5)
-    assert answer.unsupported == [("ball", "floor", "first contact at a distance (half_space-sphere) is unsupported")]
+    answer = scene_of([floor, falling]).first_contacts(2.0, margin=0.5)
+    assert answer.time_lower[0] <= 1.0 <= answer.time_upper[0] <= answer.time_lower[0] + 1e-6
+    sheet = gs.SceneObject("sheet", gs.Mesh(np.eye(3), [(0, 1, 2)]), [0, 0, 2.0, 0, 0, 0, 1])
+    answer = scene_of([sheet, falling]).first_contacts(1.0, margin=0.5)
+    assert answer.unsupported == [("ball", "sheet", "first contact at a distance (mesh-sphere) is unsupported")]
 
 
 def test_margin_where_only_the_present_is_asked_about():
