@@ -86,16 +86,36 @@ _PLANE = Peer(False, 0.0, "collide() only: the distance of a half space segfault
 PEERS = {
     "box-box": _POLYTOPES,
     "box-capsule": _CURVED,
+    "box-cone": _CURVED,
     "box-convex": _POLYTOPES,
+    "box-cylinder": _CURVED,
+    "box-ellipsoid": _CURVED,
     "box-half_space": _PLANE,
     "box-sphere": _CLOSED,
     "capsule-capsule": _CLOSED,
+    "capsule-cone": _CURVED,
     "capsule-convex": _CURVED,
+    "capsule-cylinder": _CURVED,
+    "capsule-ellipsoid": _CURVED,
     "capsule-half_space": _PLANE,
     "capsule-sphere": _CLOSED,
+    "cone-cone": _CURVED,
+    "cone-convex": _CURVED,
+    "cone-cylinder": _CURVED,
+    "cone-ellipsoid": _CURVED,
+    "cone-sphere": _CURVED,
     "convex-convex": _POLYTOPES,
+    "convex-cylinder": _CURVED,
+    "convex-ellipsoid": _CURVED,
     "convex-half_space": _PLANE,
     "convex-sphere": _CURVED,
+    "cylinder-cylinder": _CURVED,
+    "cylinder-ellipsoid": _CURVED,
+    "cylinder-half_space": _PLANE,
+    "cylinder-sphere": _CURVED,
+    "ellipsoid-ellipsoid": _CURVED,
+    "ellipsoid-half_space": _PLANE,
+    "ellipsoid-sphere": _CURVED,
     "half_space-sphere": _PLANE,
     "sphere-sphere": _CLOSED,
 }
@@ -132,7 +152,9 @@ class Solid(NamedTuple):
         elif len(vertices):
             diameter = float(np.linalg.norm(np.ptp(vertices, axis=0)))
             reach = float(np.linalg.norm(vertices, axis=1).max())
-        else:  # sphere: radius and 0; capsule: radius and half length
+        elif kind == "ellipsoid":
+            diameter = 2.0 * float(params.max())
+        else:  # sphere: radius and 0; capsule, and what lies in one, cylinder and cone: radius and half length
             diameter = 2.0 * float(params[0] + params[1])
         return cls(number, kind, packed, diameter, max(reach, diameter))
 

@@ -120,6 +120,9 @@ def _expression(shape: AnyShape) -> str:
     fields = {
         "sphere": ("radius",),
         "capsule": ("radius", "length"),
+        "cylinder": ("radius", "length"),
+        "cone": ("radius", "length"),
+        "ellipsoid": ("radii",),
         "box": ("half_extents",),
         "half_space": ("normal", "offset"),
     }

@@ -67,6 +67,16 @@ class Placed(NamedTuple):
             return float(np.linalg.norm(np.maximum(np.abs(local) - self.params[:3], 0.0)))
         if self.kind == "half_space":
             return max(0.0, float(self.params[:3] @ local) - params[3])
+        if self.kind in ("cylinder", "cone"):
+            across, along = float(np.hypot(local[0], local[1])), float(local[2])
+            radius, half = params[:2]
+            if self.kind == "cylinder":
+                return float(np.hypot(max(across - radius, 0.0), max(abs(along) - half, 0.0)))
+            return _beyond_profile(across, along, radius, half)
+        if self.kind == "ellipsoid":
+            # Scaled down to the surface, which is no nearer than the nearest point.
+            stretch = float(np.linalg.norm(local / self.params[:3]))
+            return float(np.linalg.norm(local)) * (1.0 - 1.0 / stretch) if stretch > 1.0 else 0.0
         return float(np.linalg.norm(hull_weights(self.vertices, local) @ self.vertices - local))
 
     def support(self, direction: FloatArray) -> float:
@@ -80,6 +90,11 @@ class Placed(NamedTuple):
             reach = params[0] * length + params[1] * abs(float(local[2]))
         elif self.kind == "box":
             reach = float(self.params[:3] @ np.abs(local))
+        elif self.kind in ("cylinder", "cone"):
+            rim, along = params[0] * float(np.hypot(local[0], local[1])), params[1] * float(local[2])
+            reach = rim + abs(along) if self.kind == "cylinder" else max(rim - along, along)
+        elif self.kind == "ellipsoid":
+            reach = float(np.linalg.norm(self.params[:3] * local))
         elif self.kind == "half_space":
             # Bounded along its own normal only; `bracket` uses exactly that one.
             reach = params[3] if np.array_equal(direction, self.outward) else np.inf
@@ -91,6 +106,19 @@ class Placed(NamedTuple):
     def outward(self) -> FloatArray:
         """Normal of a half space where it is."""
         return self.rotation @ self.params[:3]
+
+
+def _beyond_profile(across: float, along: float, radius: float, half: float) -> float:
+    """Distance of a point from a cone, `across` from its axis and `along` it from the middle of its height."""
+    side = np.array([-radius, 2.0 * half])  # from the rim up to the tip
+    rim = np.array([radius, -half])
+    point = np.array([across, along])
+    if along >= -half and float(side[1] * (point - rim)[0] - side[0] * (point - rim)[1]) <= 0.0:
+        return 0.0
+    square = float(side @ side)
+    share = min(max(float((point - rim) @ side) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    base = np.array([min(across, radius), -half])
+    return float(min(np.linalg.norm(point - rim - share * side), np.linalg.norm(point - base)))
 
 
 def bracket(a: Placed, b: Placed, point_a: FloatArray, point_b: FloatArray, normal: FloatArray) -> Bracket:

@@ -44,6 +44,7 @@ from geomsrv._witness import Bracket, Placed, bracket
 from geomsrv.answers import Distances, DistanceStatus
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.queries import distance
+from geomsrv.shapes import CURVED
 
 if TYPE_CHECKING:
     from geomsrv.pairwise import ListedDistances
@@ -586,6 +587,8 @@ def cross_check_scene(scene: Scene, max_distance: float = np.inf, *, timeout_s: 
 
 def _exactly(a: AnyShape, b: AnyShape, pose: FloatArray) -> Bracket | None:
     """What exact arithmetic gives for a pair; None where there is no kernel for that."""
+    if isinstance(a, CURVED) or isinstance(b, CURVED):
+        return None  # answered as at float64
     try:
         answer = distance(a, b, pose, accuracy="exact", want=("penetration",))
     except NotAvailableError:

@@ -93,6 +93,12 @@ class Peer:
             return self.module.Capsule(params[0], 2.0 * params[1])
         if kind == "box":
             return self.module.Box(*(2.0 * half for half in params[:3]))
+        if kind == "cylinder":
+            return self.module.Cylinder(params[0], 2.0 * params[1])
+        if kind == "cone":
+            return self.module.Cone(params[0], 2.0 * params[1])
+        if kind == "ellipsoid":
+            return self.module.Ellipsoid(*params[:3])
         if kind == "half_space":
             return self.module.Halfspace(np.array(params[:3]), params[3])
         return self._hull(vertices)
