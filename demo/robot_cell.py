@@ -36,6 +36,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data  # noqa: E402
 from rich.console import Console  # noqa: E402
+from rich.markup import escape  # noqa: E402
 from rich.table import Table  # noqa: E402
 from sensor_msgs.msg import CameraInfo  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -50,10 +51,19 @@ ANSWER_DEADLINE_S = 20.0
 HORIZON_S = 5.0
 MAX_DISTANCE_M = 0.5
 TIMED_CALLS = 50
+TIMED_QUERIES = 15
 SURELY_S = 1e-5  # much longer than the time in which a contact is proven, and than what rounding moves it by
 LATCHED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+TOPICS: dict[str, tuple[type, QoSProfile | int]] = {
+    "contacts": (gm.ContactArray, 10),
+    "distances": (gm.DistanceArray, 10),
+    "visible": (gm.VisibleArray, 10),
+    "state": (gm.EngineState, STATE),
+}
 
 
 class DemoFailure(Exception):
@@ -75,13 +85,7 @@ class Client:
         self.states = self.node.create_publisher(gm.ShapeStates, "/geomsrv/states", BEST_EFFORT)
         self.polygons = self.node.create_publisher(PolygonInstanceStamped, "/geomsrv/polygons", 10)
         self.camera = self.node.create_publisher(CameraInfo, "/geomsrv/camera_info", qos_profile_sensor_data)
-        for kind, topic, qos in (
-            (gm.ContactArray, "contacts", 10),
-            (gm.DistanceArray, "distances", 10),
-            (gm.VisibleArray, "visible", 10),
-            (gm.EngineState, "state", STATE),
-        ):
-            self.node.create_subscription(kind, f"/geomsrv/{topic}", self._keep(topic), qos)
+        self._subscriptions = {topic: self._listen(topic) for topic in TOPICS}
         self._services = {
             name: self.node.create_client(kind, f"/geomsrv/{name}")
             for name, kind in (
@@ -94,6 +98,29 @@ class Client:
         }
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
+
+    def _listen(self, topic: str) -> Any:
+        kind, qos = TOPICS[topic]
+        return self.node.create_subscription(kind, f"/geomsrv/{topic}", self._keep(topic), qos)
+
+    def listen_to(self, *topics: str) -> None:
+        """These and ~/state, and nothing else."""
+        for topic in [topic for topic in self._subscriptions if topic not in (*topics, "state")]:
+            self.node.destroy_subscription(self._subscriptions.pop(topic))
+            self.latest.pop(topic, None)
+        for topic in topics:
+            if topic not in self._subscriptions:
+                self._subscriptions[topic] = self._listen(topic)
+
+    def plan_when(self, stage: str, runs: bool) -> dict[str, tuple[bool, str]]:
+        """The plan once a stage runs, or does not: whether each does, and why."""
+
+        def plan(state: Any) -> dict[str, tuple[bool, str]]:
+            rows = zip(state.plan_stages, state.plan_active, state.plan_reasons, strict=True)
+            return {name: (bool(active), reason) for name, active, reason in rows}
+
+        what = f"a plan in which {stage} {'runs' if runs else 'does not run'}"
+        return plan(self.wait_for("state", what, lambda state: plan(state)[stage][0] == runs))
 
     def _keep(self, topic: str) -> Callable[[Any], None]:
         def keep(message: Any) -> None:
@@ -264,7 +291,7 @@ def show_distances(console: Console, response: Any, ours: set[str]) -> int:
     names = cell.NAMES
     table = Table(title="Distance", title_justify="left")
     for heading in ("pair", "distance [mm]", "proven to within [mm]"):
-        table.add_column(heading, justify="left" if heading == "pair" else "right")
+        table.add_column(escape(heading), justify="left" if heading == "pair" else "right")
     order = np.argsort(np.asarray(response.distance), kind="stable").tolist()
     robot_rows = [i for i in order if len({response.ids_a[i], response.ids_b[i]} & ours) == 1]
     if not robot_rows:
@@ -285,7 +312,7 @@ def show_contacts(console: Console, response: Any) -> list[picture.PlannedContac
     names = cell.NAMES
     table = Table(title=f"First contact within {HORIZON_S:g} s", title_justify="left")
     for heading in ("pair", "outcome", "time [s]", "proven width [s]", "contact set [m]"):
-        table.add_column(heading)
+        table.add_column(escape(heading))
     planned = []
     for i, (a, b) in enumerate(zip(response.ids_a, response.ids_b, strict=True)):
         status = gs.ContactStatus(response.item_status[i])
@@ -371,6 +398,68 @@ def show_cross_check(console: Console, state: Any) -> None:
     console.print(table)
 
 
+#: Ways to ask, as arguments; and how they are called here.
+WAYS: dict[str, dict[str, Any]] = {
+    "bound": {"accuracy": "bound"},
+    "float64": {"accuracy": "float64"},
+    "auto": {"accuracy": "auto"},
+    "auto, 1 mm or 1 ms": {"tolerance": 1e-3},
+    "exact": {"accuracy": "exact"},
+}
+
+
+def show_prices(console: Console, world: gs.Scene) -> None:
+    """What accuracy costs for the demo's own questions, asked in this process about the same world."""
+    camera = cell.camera_frustum()
+    questions: dict[str, Callable[..., Any]] = {
+        "cull": lambda **how: world.cull(camera, **how),
+        "distance": lambda **how: world.distances(MAX_DISTANCE_M, **how),
+        "first contact": lambda **how: world.first_contacts(HORIZON_S, **how),
+    }
+    table = Table(title="What accuracy costs here, nothing remembered", title_justify="left")
+    for heading in ("query", "asked for", "tier", "proven to within", "unanswered", "CPU time [ms]"):
+        table.add_column(escape(heading), justify="right" if heading in ("unanswered", "CPU time [ms]") else "left")
+    for query, ask in questions.items():
+        for name, how in WAYS.items():
+            times = []
+            for _ in range(TIMED_QUERIES):
+                world.forget()
+                begin = time.thread_time()
+                answer = ask(**how)
+                times.append(1e3 * (time.thread_time() - begin))
+            silent = len(getattr(answer, "unsupported", ()))
+            proven = _proven(answer, {"cull": "", "distance": "m", "first contact": "s"}[query])
+            table.add_row(query, name, answer.cost.accuracy, proven, str(silent), f"{statistics.median(times):.2f}")
+    console.print(table)
+
+
+def _proven(answer: Any, unit: str) -> str:
+    """How many numbers or states of an answer are proven, and how well."""
+    if unit == "":
+        return f"{np.count_nonzero(answer.certain)} of {len(answer.certain)} states"
+    lower, upper = (getattr(answer, name if hasattr(answer, name) else f"time_{name}") for name in ("lower", "upper"))
+    width = (upper - lower)[~np.isnan(upper - lower)]
+    proven = width[np.isfinite(width)]
+    return f"{len(proven)} of {len(width)} to {proven.max(initial=0.0):.1e} {unit}"
+
+
+def show_plans(console: Console, client: Client) -> None:
+    """What the node computes while one topic is listened to, and when a second subscriber joins."""
+    client.listen_to("visible")
+    before = client.plan_when("distance", False)
+    client.listen_to("visible", "contacts")
+    after = client.plan_when("first_contact", True)
+    first = client.wait_for("contacts", "the first message of a new subscriber", lambda message: message.checked > 0)
+    table = Table(title="The plan before and after somebody listens to ~/contacts, too", title_justify="left")
+    for heading in ("stage", "before", "after"):
+        table.add_column(heading)
+    for stage, (ran, why) in before.items():
+        runs, reason = after[stage]
+        table.add_row(stage, f"{'runs' if ran else '-'}: {why}", f"{'runs' if runs else '-'}: {reason}")
+    console.print(table)
+    console.print(f"Its first message: {first.checked} pairs checked, {len(first.contacts)} contacts\n")
+
+
 def run(console: Console, path: Path) -> None:
     """The demo; raises DemoFailure where it does not get what it was promised."""
     start = time.perf_counter()
@@ -435,7 +524,7 @@ def run(console: Console, path: Path) -> None:
         console.print(
             "Calls: "
             + ", ".join(f"~/{name} {ms:.2f} ms" for name, ms in medians.items())
-            + f" (median of {TIMED_CALLS})"
+            + f" (median of {TIMED_CALLS}; the node remembers what it found of pairs that rest)"
         )
         console.print(
             f"Topics: {len(visible.ids)} visible, {len(contacts.contacts)} contacts; self check: {checks.message}"
@@ -466,11 +555,20 @@ def run(console: Console, path: Path) -> None:
             ),
             path,
         )
+        show_prices(console, rebuilt(scene.scene))
+        show_plans(console, client)
     finally:
         if stream is not None:
             stream.stop()
         client.close()
     console.print(f"Picture: {path}   total {time.perf_counter() - start:.1f} s")
+
+
+def rebuilt(message: gm.SceneUpdate) -> gs.Scene:
+    """A scene of this process with all that the node's has."""
+    world = gs.Scene()
+    world.apply(convert.update_from(message))
+    return world
 
 
 def swung_joints(t: float) -> dict[str, float]:

@@ -5,6 +5,9 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -210,7 +213,7 @@ def test_every_effect_has_something_to_say() -> None:
     assert {name for name, value in WHOLE.items() if value} == set(OPTIONAL) - {"cross_check", "markers"}
 
 
-@pytest.mark.parametrize(("one", "other"), itertools.combinations(OPTIONAL, 2))
+@pytest.mark.parametrize(("one", "other"), list(itertools.combinations(OPTIONAL, 2)))
 def test_two_effects_off_leave_the_others_bit_identical(one, other) -> None:
     off = {one, other}
     gone = off | {name for name, needs in DEPENDS.items() if needs & off}
@@ -264,3 +267,10 @@ def test_the_cross_check_can_be_switched_alone() -> None:
         assert engine.cross_check.mode == "all"
     finally:
         engine.close()
+
+
+def test_the_page_shows_what_runs() -> None:
+    """docs/effects.md: its table and its plans are those of the sources."""
+    root = Path(__file__).resolve().parents[1]
+    run = subprocess.run([sys.executable, "-P", str(root / "tools" / "write_effects.py"), "--check"], check=False)
+    assert run.returncode == 0, "run tools/write_effects.py"
