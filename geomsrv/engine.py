@@ -8,6 +8,8 @@ that is not active is never entered, and the counters prove it.
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -107,6 +109,7 @@ class Engine:
         self.config = config
         self.camera: Frustum | None = None
         self.stamp: Any = None
+        self._states_came = math.nan  # clock of the last ~/states [s]
         self.counters: Counter[str] = Counter()
         self.totals = Totals()
         self.cross_check = _cross_check(config)
@@ -135,9 +138,20 @@ class Engine:
     def set_states(self, ids: Sequence[str], poses: ArrayLike, twists: ArrayLike | None, stamp: Any = None) -> int:
         """Move objects; returns the scene's version."""
         version = self.scene.set_states(ids, poses, twists, stamp)
+        self._states_came = time.monotonic()
         self.stamp = stamp
         self.counters["states"] += 1
         return version
+
+    @property
+    def input_age(self) -> float:
+        """Seconds since states came; NaN if none ever did."""
+        return time.monotonic() - self._states_came
+
+    @property
+    def stale(self) -> bool:
+        """Whether a stream of states had begun and has been silent for too long."""
+        return self.input_age > self.config.states_timeout
 
     @property
     def moving_count(self) -> int:

@@ -199,7 +199,8 @@ def climbed_distance_rows(
     wanted, too, which bounding volumes do not have.
     """
     missing = [Unsupported.none()]
-    rungs = quality.rungs(TIERS, MEASURING, lengths=True)
+    # Pairs have come through their bounding boxes already.
+    rungs = quality.rungs(TIERS, MEASURING[1:], lengths=True)
 
     def solve(chosen: IntArray, tier: str) -> tuple[DistanceRows, IntArray]:
         rows, unsupported = distance_rows(world, chosen, penetration, tier, counts)

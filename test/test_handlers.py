@@ -744,6 +744,28 @@ def test_a_tolerance_instead_of_a_tier(desk) -> None:
     assert got.status == OK and got.cost.error_bound == 0.0
 
 
+SCENE_REQUESTS = [
+    ("Distance", {"select": ALL, "max_distance": 9.0}),
+    ("Distance", {"select": BY_IDS, "ids_a": ["box"], "ids_b": ["ball"]}),
+    ("FirstContact", {"select": ALL, "horizon": 1.0}),
+    ("FirstContact", {"select": BY_IDS, "ids_a": ["box"], "ids_b": ["ball"]}),
+    ("Cull", {"select": ALL, "view": 1, "frustum": frustum()}),
+]
+
+
+@pytest.mark.parametrize(("service", "fields"), SCENE_REQUESTS)
+def test_stale_states_are_a_status(desk, monkeypatch, service, fields) -> None:
+    got = desk.ask(service, **fields)
+    assert not got.stale and math.isnan(got.input_age), "no stream ever began"
+    now = 100.0
+    monkeypatch.setattr("geomsrv.engine.time.monotonic", lambda: now)
+    desk.engine.set_states(["ball"], [(1.5, 0, 0, 0, 0, 0, 1)], None)
+    for passed, stale in ((0.5, False), (1.0, False), (1.5, True)):
+        now = 100.0 + passed
+        got = desk.ask(service, **fields)
+        assert (got.stale, got.input_age) == (stale, passed) and got.status in (OK, UNSUPPORTED)
+
+
 def test_totals_add_up(desk) -> None:
     """What queries cost, by service and tier."""
     for accuracy in ("float64", "exact", "exact"):

@@ -359,6 +359,25 @@ def test_states_that_say_the_same_wake_nobody_up(client) -> None:
         inbox.wait(lambda m: m.header.stamp.sec == 4)
 
 
+def test_answers_about_a_stream_that_stopped_say_so(client) -> None:
+    with running_node(max_rate=1000.0, states_timeout=0.2):
+        update = msg.SceneUpdate(add=[body("a", gs.Sphere(0.5)), body("b", gs.Sphere(0.5), (9, 0, 0))])
+        client.call(srv.ApplyScene, "apply_scene", update=update)
+        moved = client.publisher(msg.ShapeStates, "states", dict((topic.name, topic.qos) for topic in INPUTS)["states"])
+        said = msg.ShapeStates(ids=["b"], poses=array.array("d", [4.0, 0, 0, 0, 0, 0, 1]))
+
+        def ask() -> srv.Distance.Response:
+            return client.call(srv.Distance, "distance", select=2, max_distance=20.0)
+
+        moved.publish(said)
+        client.until(lambda: ask().distance[0] == 3.0, "the new state")
+        client.until(lambda: ask().stale, "it is stale")
+        got = client.listen(msg.DistanceArray, "distances").wait()
+        assert got.stale and got.input_age > 0.2 and got.distances == []
+        moved.publish(said)
+        client.until(lambda: not ask().stale, "it goes on")
+
+
 def test_evaluations_are_paced(client) -> None:
     with running_node(max_rate=5.0):
         contacts = client.listen(msg.ContactArray, "contacts")

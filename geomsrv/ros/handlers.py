@@ -202,6 +202,7 @@ class Handlers:
                 state, certain = state[order], certain[order]
             rows = np.array([world.index[name] for name in ids], dtype=np.int64)
             response.ids, response.scene_version = ids, answer.version
+            self._set_age(response)
         else:
             raise GeometryError(f"select must be BY_IDS, INLINE or ALL, got {request.select}")
         if request.certificates:
@@ -242,6 +243,7 @@ class Handlers:
             response.certificates = list(distance_certificates(world, pairs, want=want, accuracy=tier))
         if request.select == BY_IDS:
             _set_ids(response, world, pairs)
+            self._set_age(response)
         self._set_distances(response, "~/distance", answer, want)
         _set_unsupported(response, answer.status == DistanceStatus.UNSUPPORTED, answer.message, lonely)
 
@@ -288,6 +290,7 @@ class Handlers:
         response.ids_a = [ids_a[i] for i in rows] + [a for a, _, _ in missing]
         response.ids_b = [ids_b[i] for i in rows] + [b for _, b, _ in missing]
         response.scene_version = near.version
+        self._set_age(response)
         response.item_status = convert.bytes_(_extended(near.status[order], len(missing), DistanceStatus.UNSUPPORTED))
         for name in _distance_columns(want):
             column = _extended(getattr(near, name)[order], len(missing), np.nan)
@@ -319,6 +322,7 @@ class Handlers:
             response.ids_a = [answer.ids_a[i] for i in order.tolist()]
             response.ids_b = [answer.ids_b[i] for i in order.tolist()]
             response.scene_version = answer.version
+            self._set_age(response)
         else:
             world, pairs = self._listed(request, moving=True)
             if request.earliest:
@@ -340,6 +344,7 @@ class Handlers:
                 response.certificates = list(lines)
             if request.select == BY_IDS:
                 _set_ids(response, world, pairs)
+                self._set_age(response)
         self._set_first_contacts(response, "~/first_contact", answer, order, want)
         if contact_set:
             ends = answer.part_offsets
@@ -498,6 +503,10 @@ class Handlers:
         return world, pairs
 
     # --------------------------------------------------------------------------------------------------- responses
+
+    def _set_age(self, response: Any) -> None:
+        """How old the scene's states are."""
+        response.stale, response.input_age = self.engine.stale, self.engine.input_age
 
     def _set_cost(self, response: Any, query: str, answer: Any, items: int) -> None:
         """What the answer cost, also among the totals."""

@@ -197,7 +197,7 @@ class GeomsrvNode(LifecycleNode):
         self._config = self._changed(parameters)
         if self._engine is not None:
             self._engine.configure(self._config)
-            self._doze_timer.timer_period_ns = int(1e9 / self._config.idle_rate)
+            self._doze_timer.timer_period_ns = int(1e9 * self._nap())
             self._doze()
             self._inputs.refresh_camera()
             self._input_arrived()
@@ -293,7 +293,7 @@ class GeomsrvNode(LifecycleNode):
             for name, callback in self._service_callbacks().items()
         ]
         self._states_group, self._repeats = _Dozing(), 0
-        self._timers_made.append(self.create_timer(1.0 / config.idle_rate, self._doze, clock=self._steady))
+        self._timers_made.append(self.create_timer(self._nap(), self._doze, clock=self._steady))
         self._doze_timer = self._timers_made[-1]
         self._subscriptions_made = [
             self.create_subscription(
@@ -399,6 +399,10 @@ class GeomsrvNode(LifecycleNode):
         wanted = self._active and self._enabled and any(stage.active for stage in engine.plan(self._asked()))
         self._states_group.asleep = self._repeats >= QUIET and not wanted
 
+    def _nap(self) -> float:
+        """How long not to look at ~/states [s]: no longer than would make them look stale."""
+        return min(1.0 / self._config.idle_rate, 0.5 * self._config.states_timeout)
+
     def _take_states(self) -> None:
         """The newest message of ~/states, if it is still there."""
         if not self._states_group.asleep:
@@ -452,6 +456,7 @@ class GeomsrvNode(LifecycleNode):
             elif engine.camera is not None:
                 message = msg.VisibleArray(header=header)
                 convert.set_visible(message, answer, engine.camera)
+            message.stale, message.input_age = engine.stale, engine.input_age
             self._outputs[topic].publish(message)
             yield
         # The drawing shows the contacts just found.
