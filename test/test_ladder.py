@@ -134,6 +134,7 @@ def test_auto_decides_what_float64_leaves_open(rng) -> None:
     camera, boxes = cull_scenes.touching_scene(rng, 200)
     plain, auto = (gs.cull(camera, boxes, accuracy=accuracy) for accuracy in ("float64", "auto"))
     assert auto.certain.all() and not plain.certain.all()
+    assert (auto.error_bound, plain.error_bound) == (0.0, np.inf)
     assert auto.state.tolist() == gs.cull(camera, boxes, accuracy="exact").state.tolist()
     cell = gs.Boxes.from_poses(
         np.hstack([rng.integers(-3, 4, (400, 3)) * 0.2, np.tile([0, 0, 0, 1.0], (400, 1))]), [0.1] * 3
@@ -258,6 +259,11 @@ def test_scenes_keep_tolerances(rng) -> None:
         both = [(row[pair], k) for k, pair in enumerate(pairs) if pair in row]
         assert all(answer.lower[i] <= exact.upper[k] and exact.lower[k] <= answer.upper[i] for i, k in both)
     assert answer.cost.accuracy == "float64" and tier_counts(answer.cost)["float64"] > 0
+    # Poses are rounded before anything is measured: nothing can prove this, and exact arithmetic has tried.
+    answer = scene.distances(2.0, tolerance=1e-300, want=("penetration",))
+    hopeless = answer.upper > np.nextafter(answer.lower, np.inf)
+    assert hopeless.any() and answer.cost.accuracy == "exact" and tier_counts(answer.cost)["exact"] > 0
+    assert ((answer.status == DistanceStatus.NOT_CONVERGED) == hopeless).all()
     nearest = scene.nearest_pair(tolerance=1e-6)
     assert nearest.distance[0] == scene.nearest_pair().distance[0]
 
@@ -279,6 +285,13 @@ def test_scenes_keep_time_tolerances(rng) -> None:
             if pair in hits:
                 assert answer.time_lower[found[pair]] <= default.time_upper[k]
                 assert default.time_lower[k] <= answer.time_upper[found[pair]]
+    bar = gs.SceneObject("bar", gs.Box([1.0, 0.1, 0.1]), (0, 0, 9, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1))
+    post = gs.SceneObject("post", gs.Box([0.1, 0.1, 0.1]), (0, 0.9, 9, 0, 0, 0, 1))
+    swing = scene_of([bar, post])
+    widths = [
+        float((x.time_upper - x.time_lower)[0]) for x in (swing.first_contacts(4.0, tolerance=t) for t in (1e-1, 1e-9))
+    ]
+    assert widths[1] <= 1e-9 < 1e-6 < widths[0] <= 1e-1
     first = scene.first_contacts(3.0, earliest=True, accuracy="auto")
     assert first.time[0] == pytest.approx(np.nanmin(default.time), abs=1e-6)
 

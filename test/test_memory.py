@@ -12,6 +12,7 @@ import pytest
 from scene_answers import scene_of
 
 import geomsrv as gs
+from geomsrv.world import HISTORY
 
 CAMERA = gs.Frustum([0, 0, -3], np.eye(3), 0.5, 0.5, 0.5, 5.0)
 QUESTIONS: dict[str, Any] = {
@@ -141,6 +142,17 @@ def test_what_did_not_change_costs_nothing(rng) -> None:
     scene.set_states(["o009"], pose(rng, False)[None])
     assert scene.cull(CAMERA).cost.counts["remembered"] == 199
     assert scene.cull(CAMERA).cost.counts["remembered"] == 200
+
+
+def test_many_moves_between_two_questions(rng) -> None:
+    """More than a world remembers by row."""
+    scene = scene_of([gs.SceneObject(f"o{k:02}", gs.Box([0.2, 0.2, 0.2]), pose(rng, False)) for k in range(40)])
+    ask = QUESTIONS["distances"]
+    for count in (1, HISTORY - 1, HISTORY, HISTORY + 1, 3 * HISTORY):
+        ask(scene)
+        for k in range(count):
+            scene.set_states([f"o{k:02}"], pose(rng, False)[None])
+        assert columns(ask(scene)) == columns(ask(made_anew(scene))), count
 
 
 def test_the_very_same_states_are_no_change(rng) -> None:
