@@ -11,6 +11,7 @@ to contact it is looked for a little ahead: a time at which the depth proves it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -62,6 +63,41 @@ DOUBLINGS, CHORDS = 6, 3  #: how a step is made longer while its bound allows it
 ALMOST_ALONG = 0.125  #: a solid of revolution that turns about its axis, but for this share, counts as turning its axis
 
 SPHERE, CAPSULE, BOX, CONVEX, HALF_SPACE, CYLINDER, CONE, ELLIPSOID = range(8)
+
+
+# pi / 2 in three parts, of which the first two have so few bits that whole multiples of them below 2^29 are exact.
+HALF_PI = tuple(map(float.fromhex, ("0x1.921fb4p+0", "0x1.4442dp-24", "0x1.8469898cc517p-48")))
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Along the last axis, of length 3; written out, since what numpy sums first depends on the processor."""
+    product: FloatArray = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return product
+
+
+def _norm(a: FloatArray) -> FloatArray:
+    """Along the last axis, of length 3 or 4."""
+    square = _dot(a, a) + (a[..., 3] * a[..., 3] if a.shape[-1] == 4 else 0.0)
+    length: FloatArray = np.sqrt(square)
+    return length
+
+
+def _sine_and_cosine(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of angles up to 2^29, to 3 u, by sums and products alone: numpy's own depend on the processor."""
+    quarters = np.rint(x * (2.0 / np.pi))
+    r = x
+    for part in HALF_PI:
+        r = r - quarters * part
+    square = r * r
+    sine, cosine = np.zeros_like(r), np.zeros_like(r)
+    for k in range(8, -1, -1):
+        cosine = 1.0 / math.factorial(2 * k) - square * cosine
+        sine = 1.0 / math.factorial(2 * k + 1) - square * sine
+    sine = r * sine
+    turns = np.where(np.isfinite(quarters), np.mod(quarters, 4.0), 0.0)
+    odd = (turns == 1.0) | (turns == 3.0)
+    s, c = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    return np.where(turns >= 2.0, -s, s), np.where((turns == 1.0) | (turns == 2.0), -c, c)
 
 
 class Look(NamedTuple):
@@ -121,10 +157,10 @@ class _Motion:
         """Places (k, 2, 3), orientations (k, 2, 4), and how far rounding may have moved a point of a side (k, 2)."""
         t = time[:, None]
         place = self.place + t[..., None] * self.velocity
-        rate = np.linalg.norm(self.spin, axis=2)
+        rate = _norm(self.spin)
         angle = t * rate
         axis = self.spin / np.where(rate > 0.0, rate, 1.0)[..., None]
-        sine, cosine = np.sin(0.5 * angle), np.cos(0.5 * angle)
+        sine, cosine = _sine_and_cosine(0.5 * angle)
         x, y, z = np.moveaxis(axis * sine[..., None], 2, 0)
         a, b, c, d = np.moveaxis(self.turn, 2, 0)
         turned = np.stack(
@@ -136,13 +172,13 @@ class _Motion:
             ],
             axis=2,
         )
-        turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+        turned /= _norm(turned)[..., None]
         turns = angle > 0.0
         turn = np.where(turns[..., None], turned, self.turn)
         far = self.size
         if (planes := self.kind == HALF_SPACE).any():
             # The rounding of a plane's turn is felt where the other body is.
-            apart = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)[:, None]
+            apart = _norm(place[:, 1] - place[:, 0])[:, None]
             far = np.where(planes, far + far[:, ::-1] + apart, far)
         off = np.where(turns, far * (TURN_ROUNDING * angle + ORIENTATION_ROUNDING), 0.0)
         way = np.abs(self.place).sum(axis=2) + np.abs(t[..., None] * self.velocity).sum(axis=2)
@@ -172,8 +208,8 @@ def _supports(motion: _Motion, side: int, rotation: FloatArray, direction: Float
     """(k,) highest n . x of the bodies of one side about their origins, along directions (k, 3) of any length."""
     table, shape = motion.world.table, motion.shape[:, side]
     kind, params = table.packed.kinds[shape], table.packed.params[shape]
-    e = np.einsum("kij,ki->kj", rotation, direction)
-    length, across = np.linalg.norm(direction, axis=1), np.hypot(e[:, 0], e[:, 1])
+    e: FloatArray = np.stack([_dot(rotation[:, :, k], direction) for k in range(3)], axis=1)  # R^T n
+    length, across = _norm(direction), np.sqrt(e[:, 0] * e[:, 0] + e[:, 1] * e[:, 1])
     radius, half = params[:, 0], params[:, 1]
     found = np.where(kind == SPHERE, radius * length, 0.0)
     found = np.where(kind == CAPSULE, radius * length + half * np.abs(e[:, 2]), found)
@@ -181,7 +217,7 @@ def _supports(motion: _Motion, side: int, rotation: FloatArray, direction: Float
     found = np.where(kind == HALF_SPACE, params[:, 3], found)
     found = np.where(kind == CYLINDER, radius * across + half * np.abs(e[:, 2]), found)
     found = np.where(kind == CONE, np.maximum(half * e[:, 2], radius * across - half * e[:, 2]), found)
-    found = np.where(kind == ELLIPSOID, np.linalg.norm(e * params[:, :3], axis=1), found)
+    found = np.where(kind == ELLIPSOID, _norm(e * params[:, :3]), found)
     if len(hulls := np.flatnonzero(kind == CONVEX)):
         vertices, ends = gather(table.packed.vertices, table.packed.offsets, shape[hulls])
         heights = (vertices * np.repeat(e[hulls], np.diff(ends), axis=0)).sum(axis=1)
@@ -200,9 +236,9 @@ class _Room:
         rotation = _validate.rotation_matrices(turn.reshape(-1, 4)).reshape(count, 2, 3, 3)
         normal = look.normal
         step, speed = place[:, 1] - place[:, 0], motion.velocity[:, 1] - motion.velocity[:, 0]
-        apart = np.linalg.norm(step, axis=1)
+        apart = _norm(step)
         plane = kind == HALF_SPACE
-        rate = np.linalg.norm(motion.spin, axis=2)
+        rate = _norm(motion.spin)
         # Of a solid of revolution only the turning of its axis counts.
         axis = rotation[..., 2]
         round_ = np.isin(kind, (CAPSULE, CYLINDER, CONE)) | (
@@ -212,24 +248,24 @@ class _Room:
                 == motion.world.table.packed.params[motion.shape][..., 1]
             )
         )
-        along = np.einsum("ksi,ksi->ks", motion.spin, axis)
-        lean = np.linalg.norm(motion.spin - along[..., None] * axis, axis=2) + ALONG_ROUNDING * rate
+        along = _dot(motion.spin, axis)
+        lean = _norm(motion.spin - along[..., None] * axis) + ALONG_ROUNDING * rate
         slow = (round_ & (lean <= ALMOST_ALONG * rate)) | (kind == SPHERE)
         swept = np.where(slow, np.where(kind == SPHERE, 0.0, np.minimum(lean, rate) * reach), 0.0).sum(axis=1)
         spin = np.where((slow | plane)[..., None], 0.0, motion.spin)
         turning = plane & (rate > 0.0)
         blunt = turning.any(axis=1) | ~look.sound
         size = motion.size.sum(axis=1) + apart
-        fixed = np.where(blunt, np.linalg.norm(speed, axis=1), 0.0)
-        swing = np.where(blunt[:, None], np.linalg.norm(spin, axis=2) * reach, 0.0).sum(axis=1)
+        fixed = np.where(blunt, _norm(speed), 0.0)
+        swing = np.where(blunt[:, None], _norm(spin) * reach, 0.0).sum(axis=1)
         # A plane that turns comes nearer to a point at the rate at which its own points there move.
         bend = np.where(turning, rate, 0.0).sum(axis=1)
         swing += bend * (apart + reach.sum(axis=1) + motion.size.min(axis=1))
-        self._bend = bend * np.linalg.norm(speed, axis=1)
+        self._bend = bend * _norm(speed)
         self._motion, self._rotation, self._normal, self._blunt = motion, rotation, normal, blunt
         self._tilt = np.cross(normal[:, None, :], spin)
-        self._curve = (np.linalg.norm(spin, axis=2) ** 2 * reach).sum(axis=1)
-        self._closing = -np.einsum("ki,ki->k", speed, normal)
+        self._curve = (_norm(spin) ** 2 * reach).sum(axis=1)
+        self._closing = -_dot(speed, normal)
         # A normal that no rotation has rounded is the one that is meant.
         turned = (motion.turn[..., :3] != 0.0).any(axis=(1, 2)) | (rate > 0.0).any(axis=1)
         sideways = np.abs(speed * np.where((plane.any(axis=1) & ~turned)[:, None], normal, 1.0)).sum(axis=1)
@@ -257,7 +293,7 @@ class _Room:
     def step(self, longest: FloatArray) -> FloatArray:
         """(k,) seconds [0, longest] within which the bound stays positive."""
         begin = self._gap
-        spin = np.linalg.norm(self._tilt, axis=2)
+        spin = _norm(self._tilt)
         reach = self._motion.reach
         # Of the first order: no support rises faster than this.
         first = self._rate + np.where(self._blunt, 0.0, (spin * reach).sum(axis=1) + np.maximum(self._closing, 0.0))
@@ -297,10 +333,10 @@ def _by_balls(motion: _Motion, time: FloatArray, near: FloatArray, drift: FloatA
     step, speed = place[:, 1] - place[:, 0], motion.velocity[:, 1] - motion.velocity[:, 0]
     plane = motion.kind == HALF_SPACE
     bounded = ~plane.any(axis=1)
-    away = np.linalg.norm(step, axis=1)
+    away = _norm(step)
     sizes = motion.size
     radius = (sizes.sum(axis=1) + near) * (1.0 + BALL_ROUNDING) + BALL_DISTANCE_ROUNDING * away
-    closing, square = -np.einsum("ki,ki->k", step, speed), np.einsum("ki,ki->k", speed, speed)
+    closing, square = -_dot(step, speed), _dot(speed, speed)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         room = (away - radius) * (away + radius)
         under = closing * closing - square * room
@@ -310,11 +346,11 @@ def _by_balls(motion: _Motion, time: FloatArray, near: FloatArray, drift: FloatA
     still = ~(plane & motion.spin.any(axis=2)).any(axis=1)
     offset = np.where(plane, motion.world.table.packed.params[motion.shape, 3], 0.0).sum(axis=1)
     body = np.where(plane, 0.0, sizes).sum(axis=1)
-    height = np.einsum("ki,ki->k", step, normal) - offset - body - near
+    height = _dot(step, normal) - offset - body - near
     height -= BALL_DISTANCE_ROUNDING * (away + np.abs(offset) + body)
     turned = (motion.turn[..., :3] != 0.0).any(axis=(1, 2))
     sideways = np.abs(speed * np.where(turned[:, None], 1.0, normal)).sum(axis=1)
-    fall = drift - np.einsum("ki,ki->k", speed, normal) + ALONG_ROUNDING * sideways
+    fall = drift - _dot(speed, normal) + ALONG_ROUNDING * sideways
     with np.errstate(divide="ignore", invalid="ignore"):
         land = np.where(fall > 0.0, height / fall, np.inf)
     rests = ~speed.any(axis=1) & (drift == 0.0)
@@ -324,7 +360,7 @@ def _by_balls(motion: _Motion, time: FloatArray, near: FloatArray, drift: FloatA
 
 def _period(motion: _Motion) -> FloatArray:
     """(k,) [s] after which pairs without relative velocity are where they were; inf of others."""
-    rate = np.linalg.norm(motion.spin, axis=2)
+    rate = _norm(motion.spin)
     rests = (motion.velocity[:, 0] == motion.velocity[:, 1]).all(axis=1)
     single = (rate == 0.0).any(axis=1) | (motion.spin[:, 0] == motion.spin[:, 1]).all(axis=1)
     with np.errstate(divide="ignore"):
@@ -413,7 +449,7 @@ def advance(
             point[at] = np.where(clear, 0.5 * (then.point_a + then.point_b), middle[k])
             done[k] = True
         keep = np.flatnonzero(~done)
-        angle = following[keep] * np.linalg.norm(part.spin[keep], axis=2).max(axis=1, initial=0.0)
+        angle = following[keep] * _norm(part.spin[keep]).max(axis=1, initial=0.0)
         lower[rows[keep]] = following[keep]
         keep = keep[angle <= LARGEST_ANGLE]
         rows, time, seen, middle = rows[keep], following[keep], seen[keep], middle[keep]

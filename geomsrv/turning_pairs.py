@@ -296,7 +296,7 @@ def closing_speeds(world: World, rows: ContactRows) -> FloatArray:
                 velocity_at(world.twists[row, :3], world.twists[row, 3:], world.poses[row, :3], rows.time[k], points)
                 for row in (a[k], b[k])
             ]
-            speed[k] = ((at[0] - at[1]) @ rows.normal[k]).max()
+            speed[k] = approach(at[0], at[1], rows.normal[k]).max()
     return speed
 
 

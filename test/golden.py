@@ -199,6 +199,32 @@ def shapes(s: Stream, tier: str, share: int) -> Answers:
             continue  # this pair, at this tier
 
 
+def curved(s: Stream, tier: str, share: int) -> Answers:
+    count = 100 // share
+    solids = [
+        gs.Cylinder(0.5, 1.5),
+        gs.Cone(0.75, 1.25),
+        gs.Ellipsoid([0.5, 0.75, 1.25]),
+        gs.Sphere(0.75),
+        gs.Capsule(0.5, 1.25),
+        gs.Box([0.5, 1.0, 0.25]),
+        gs.Convex(s.reals(-1, 1, 8, 3)),
+        gs.HalfSpace([0.0, 0.0, 1.0], 0.125),
+    ]
+    for a, b in combinations_with_replacement(solids, 2):
+        if a.kind in ("cylinder", "cone", "ellipsoid"):
+            yield gs.distance(a, b, s.poses(count), accuracy=tier, want=("penetration",))
+    if tier == "float64":
+        for k in range(8):
+            shapes = [solids[i] for i in s.ints(0, 7, 12)]
+            twists = np.column_stack([s.reals(-2, 2, 12, 3, bits=3), s.reals(-3, 3, 12, 3, bits=3)])
+            twists[k % 2 :: 3, 3:] = 0.0
+            scene = gs.Scene()
+            bodies = zip(shapes, s.poses(12, 4), twists, strict=True)
+            scene.apply(gs.SceneUpdate(add=[gs.SceneObject(f"{i:02}", *body) for i, body in enumerate(bodies)]))
+            yield scene.first_contacts(4.0)
+
+
 QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
     query.__name__: query
     for query in (
@@ -213,6 +239,7 @@ QUERIES: dict[str, Callable[[Stream, str, int], Answers]] = {
         hulls,
         mixed,
         shapes,
+        curved,
     )
 }
 

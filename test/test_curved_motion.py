@@ -19,6 +19,7 @@ from scene_answers import scene_of
 from test_curved import BOUNDED, CURVED, body, direction, mixed
 
 import geomsrv as gs
+from geomsrv.advancement import _sine_and_cosine
 from geomsrv.answers import ContactStatus
 from geomsrv.turning import TIME_TOLERANCE
 
@@ -62,6 +63,13 @@ def gap_at(a: Any, b: Any, time: float) -> tuple[float, float]:
     ]
     answer = scene_of(objects).distances(math.inf, want=("penetration",))
     return float(answer.lower[0]), float(answer.upper[0])
+
+
+def test_angles_are_turned_without_the_library() -> None:
+    angles = np.concatenate([np.linspace(-7.0, 7.0, 1001), 2.0 ** np.arange(-40, 30), [0.0, math.pi, 1e8 + 0.1]])
+    sine, cosine = _sine_and_cosine(angles)
+    for got, function in ((sine, math.sin), (cosine, math.cos)):
+        assert np.abs(got - [function(x) for x in angles]).max() <= 4 * 2.0**-53
 
 
 def random_twist(rng: np.random.Generator) -> np.ndarray:
