@@ -53,7 +53,7 @@ METHODS = """
 | pairs of which neither object changed | what was found of them is remembered: the same bits, no look at them (`remembered` in the counts) |
 | an object that moves among many that rest | its box is compared with the others', and its pairs are found anew |
 | translation | closed forms, and rays against the difference of hulls |
-| angular velocity, spheres and capsules that move | conservative advancement, for just these pairs |
+| angular velocity, round bodies and half spaces that move | conservative advancement, for just these pairs |
 | objects out of reach within the horizon, or outside the view | their boxes are looked at, nothing else |
 | a margin, uncertainty | wider boxes, and intervals that cover both |
 | `~/states` that repeat themselves while nobody listens | looked at twice a second (`idle_rate`), and first thing when somebody asks |
