@@ -143,7 +143,9 @@ def narrow(lower: FloatArray, upper: FloatArray, tolerance: float | None) -> Boo
     if tolerance is None:
         return np.ones(len(lower), dtype=bool)
     with np.errstate(invalid="ignore"):
-        close: BoolArray = (upper - lower <= tolerance) | (upper <= np.nextafter(lower, np.inf))
+        close: BoolArray = upper - lower <= tolerance
+    wide = np.flatnonzero(~close)
+    close[wide] = upper[wide] <= np.nextafter(lower[wide], np.inf)
     return close
 
 
@@ -210,6 +212,9 @@ class Climb:
 
     def count_tiers(self, counts: Counter[str]) -> str:
         """Count how many items each tier answered, "tier float64"; returns the highest that answered any."""
+        if len(self.tiers) == 1:
+            counts.update({f"tier {self.tiers[0]}": len(self.flat)} if len(self.flat) else {})
+            return self.tiers[0]
         part = np.searchsorted(self._starts, self.flat, side="right") - 1
         by_tier: Counter[str] = Counter()
         for tier, total in zip(self.tiers, np.bincount(part, minlength=len(self.tiers)).tolist(), strict=True):
@@ -262,6 +267,13 @@ def climb(
         others.
     """
     deadline = time.perf_counter() + quality.time_budget
+    if deadline == math.inf and (rungs[0] not in tried or len(rungs) == 1):
+        answer, answered = solve(items, rungs[0])
+        done = settled(answer, rungs[0])
+        if done.all() or len(rungs) == 1:  # the common case, at no cost
+            return Climb([answer], [rungs[0]], answered, np.arange(len(answered)), done, np.zeros(1, np.int64))
+        rest = climb(answered[~done], rungs[1:], solve, settled, quality, tried=tried)
+        return _followed_by(answer, rungs[0], answered, done, rest)
     answers: list[Any] = []
     tiers: list[str] = []
     starts = [0]
@@ -298,6 +310,22 @@ def climb(
     order = np.lexsort(whole[0].T[::-1]) if whole[0].ndim == 2 else np.argsort(whole[0], kind="stable")
     items, flat, good = (column[order] for column in whole)
     return Climb(answers, tiers, items, flat, good.astype(bool), np.array(starts[:-1]))
+
+
+def _followed_by(answer: Any, tier: str, items: NDArray[Any], done: BoolArray, rest: Climb) -> Climb:
+    """What one answer settled, and a climb of the other items."""
+    count = len(done)
+    flat, settled = np.arange(count), done.copy()
+    left = np.flatnonzero(~done)
+    if len(rest.flat) == len(left):
+        flat[left], settled[left] = count + rest.flat, rest.settled
+    else:  # some of them were done with, without a row
+        kept, items = np.flatnonzero(done), np.concatenate([items[done], rest.items])
+        flat, settled = np.concatenate([kept, count + rest.flat]), np.concatenate([done[kept], rest.settled])
+        order = np.lexsort(items.T[::-1]) if items.ndim == 2 else np.argsort(items, kind="stable")
+        items, flat, settled = items[order], flat[order], settled[order]
+    starts = np.concatenate([[0], count + rest._starts])
+    return Climb([answer, *rest.answers], [tier, *rest.tiers], items, flat, settled, starts)
 
 
 def _chunks(count: int, deadline: float, *, whole: bool, all_of_it: bool) -> Iterator[slice]:

@@ -91,7 +91,7 @@ def test_answers_are_those_of_a_new_scene(rng, name) -> None:
     scene = scene_of([body(rng, f"o{k:02}") for k in range(40)])
     ask(scene)
     remembered = 0
-    for _ in range(25):
+    for _ in range(12):
         what = rng.integers(8)
         names = list(scene.ids)
         if what == 0:
