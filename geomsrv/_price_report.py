@@ -16,7 +16,7 @@ from typing import Any
 
 from geomsrv._price_measure import Measure, Priced, front
 from geomsrv._price_peers import COAL_FAMILY, FCL_FAMILY
-from geomsrv._price_ways import APPROXIMATION, FEWER, OTHER, STEPS, TIER, TOLERANCE, VOLUME
+from geomsrv._price_ways import APPROXIMATION, BUDGET, FEWER, OTHER, STEPS, TIER, TOLERANCE, VOLUME
 from geomsrv._validate import ACCURACIES
 
 __all__ = ["ABOUT", "figure", "page_html", "page_markdown", "printed", "progress", "slug", "summary", "table"]
@@ -30,6 +30,7 @@ LEAST_WIDTH = 120  #: of a table on the console, in characters
 LOOKS = {
     TIER: ("#0072B2", "o"),
     TOLERANCE: ("#56B4E9", "h"),
+    BUDGET: ("#0B7A75", "d"),
     APPROXIMATION: ("#009E73", "s"),
     FEWER: ("#E69F00", "^"),
     VOLUME: ("#CC79A7", "D"),

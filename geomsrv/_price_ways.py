@@ -56,10 +56,11 @@ BoolArray = NDArray[np.bool_]
 Ask = Callable[..., Any]
 
 SIDES = (8, 16, 32, 64, 128, 256, 512)
+BUDGETS_NS = (100.0, 1e3, 1e4)
 TOLERANCES = (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
 
 # Families, in the order of the legend.
-TIER, TOLERANCE = "geomsrv, by tier", "geomsrv, by tolerance"
+TIER, TOLERANCE, BUDGET = "geomsrv, by tier", "geomsrv, by tolerance", "geomsrv, by time budget"
 APPROXIMATION, FEWER, VOLUME = "curved shape as a hull", "fewer vertices", "bounding volume instead"
 STEPS, OTHER = "fixed steps of motion", "another method, float64"
 
@@ -295,10 +296,24 @@ def answers(query: Callable[..., Any], ask: Ask, read: Callable[[Any], Found], *
     def way(name: str, family: str, **how: Any) -> Way:
         return Way(name, family, lambda block: Call(partial(ask, block, **how), read))
 
+    def hurried(ns: float) -> Way:
+        """The anytime answer: iterations are capped by the clock."""
+        name = f"{1e-3 * ns:g} us an item"
+        return Way(name, BUDGET, lambda block: Call(partial(ask, block, time_budget=1e-9 * ns * _items(block)), read))
+
     tiers = tuple(way(tier, TIER, accuracy=tier) for tier in _validate.ACCURACIES)
     ways = (way(AUTO, TIER, accuracy=AUTO), *tiers)
     takes = by_tolerance and "tolerance" in inspect.signature(query).parameters
-    return Answers((*ways, *(way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if takes)), tiers[-1])
+    by = [way(f"tolerance {t:g}", TOLERANCE, tolerance=t) for t in TOLERANCES if takes]
+    if "time_budget" in inspect.signature(query).parameters:
+        by += map(hurried, BUDGETS_NS)
+    return Answers((*ways, *by), tiers[-1])
+
+
+def _items(block: Any) -> int:
+    """How many questions a block asks."""
+    named = next(name for name in ("center", "points", "boxes", "poses", "a") if hasattr(block, name))
+    return len(getattr(block, named))
 
 
 def on_simpler(

@@ -301,8 +301,9 @@ def test_a_tolerance_joins_as_soon_as_a_query_takes_one() -> None:
 
     ways = {way.name: way for way in answers(query, query, lambda x: Found(x <= 0.0, x)).ways}
     assert ask(ways["tolerance 1e-06"], None).value.tolist() == [1e-6]
-    # Every tier, and the choice item by item; no tolerance where the answer is a state.
-    assert len(answers(gs.cull, query, read_distances, by_tolerance=False).ways) == len(_validate.ACCURACIES) + 1
+    # Every tier, the choice item by item, and three budgets; no tolerance where the answer is a state.
+    names = [way.name for way in answers(gs.cull, query, read_distances, by_tolerance=False).ways]
+    assert names == ["auto", *_validate.ACCURACIES, "0.1 us an item", "1 us an item", "10 us an item"]
 
 
 def test_what_kills_a_process_is_told_and_kills_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
