@@ -214,6 +214,7 @@ def _stream(client: Client, pid: int, seconds: float) -> list[str]:
         return int(state.input_received[topic])
 
     def run(changing: bool) -> str:
+        message.poses[2] = 0.0
         settle = time.monotonic() + (0.0 if changing else 2.0)  # it takes a while to see that nothing changes
         while time.monotonic() < settle:
             states.publish(message)

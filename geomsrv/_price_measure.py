@@ -238,7 +238,9 @@ def errors(
         return (false_alarms + misses) / len(hit), np.nan, proven, false_alarms, misses, unsure
     off = np.concatenate([_off(a, t) for a, t in zip(answers, truths, strict=True)])
     known = off[~np.isnan(off)]
-    worst, p99 = (float(known.max()), float(np.percentile(known, 99))) if len(known) else (np.nan, np.nan)
+    worst, p99 = (
+        (float(known.max()), float(np.percentile(known, 99, method="higher"))) if len(known) else (np.nan, np.nan)
+    )
     return worst, p99, _widest(answers, _promise), false_alarms, misses, unsure
 
 

@@ -131,7 +131,7 @@ class Config:
         2.0, "horizon", "How far ahead ~/contacts looks, velocities being constant.", unit="s", minimum=0.0
     )
     idle_rate: float = _setting(
-        2.0,
+        1.0,
         "idle_rate",
         "How often ~/states is looked at while it says the same and no answer is asked for; requests and new "
         "subscribers look first.",

@@ -56,7 +56,7 @@ METHODS = """
 | angular velocity, round bodies and half spaces that move | conservative advancement, for just these pairs |
 | objects out of reach within the horizon, or outside the view | their boxes are looked at, nothing else |
 | a margin, uncertainty | wider boxes, and intervals that cover both |
-| `~/states` that repeat themselves while nobody listens | looked at twice a second (`idle_rate`), and first thing when somebody asks |
+| `~/states` that repeat themselves while nobody listens | looked at about once a second (`idle_rate`), and first thing when somebody asks |
 
 `make bench` prints the ratios: one of 10,000 boxes moves, to all; nothing moves, to all; a scene in which nothing turns, to the same
 without the rotation stage; and the share of a core that the node takes while 1,000 states come in 100 times a second.

@@ -70,6 +70,7 @@ def _latched(depth: int) -> QoSProfile:
 
 
 STATES = "states"
+NAP_SHARE = 0.8  # of the time after which states are stale, for which they are not looked at
 QUIET = 20  # messages of ~/states in a row that say the same before they are looked at now and then only
 INPUTS = (
     Topic("shapes", msg.SceneUpdate, _latched(100)),
@@ -401,7 +402,7 @@ class GeomsrvNode(LifecycleNode):
 
     def _nap(self) -> float:
         """How long not to look at ~/states [s]: no longer than would make them look stale."""
-        return min(1.0 / self._config.idle_rate, 0.5 * self._config.states_timeout)
+        return min(1.0 / self._config.idle_rate, NAP_SHARE * self._config.states_timeout)
 
     def _take_states(self) -> None:
         """The newest message of ~/states, if it is still there."""
