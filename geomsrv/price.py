@@ -169,7 +169,10 @@ SHAPES: dict[str, tuple[Shape, Shape]] = {
 }
 
 #: Pairs that have no row, and why.
-LEFT_OUT = {("half_space", "half_space"): "nearly all of them meet without end, and then there is no depth"}
+_KINDS = tuple(SHAPES)
+LEFT_OUT = {("half_space", "half_space"): "nearly all of them meet without end, and then there is no depth"} | {
+    (a, b): "no row yet" for i, a in enumerate(_KINDS) for b in _KINDS[i:] if b in ("cylinder", "cone", "ellipsoid")
+}
 
 
 def _pairs(kind_a: str, kind_b: str, deep: bool, n: int, seed: int) -> Pair:
