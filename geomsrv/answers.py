@@ -98,7 +98,8 @@ class Cost:
     elapsed_ns : int
         Wall time inside the query, validation included.
     accuracy : str
-        The tier that answered; where it was chosen item by item, the highest.
+        The tier that answered; where it was chosen item by item, the highest; "none" where a time budget allowed for
+        nothing.
     counts : dict of str to int
         Items decided per stage, by the stage's name; "tier float64" and so on where the tier was chosen item by item.
     """
