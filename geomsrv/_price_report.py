@@ -39,6 +39,9 @@ LOOKS = {
     FCL_FAMILY: ("#222222", "X"),
     COAL_FAMILY: ("#8A8A00", "*"),
 }
+# Errors that a figure has room for [m or s]: what is further off, such as the largest double in place of a depth, is in
+# the table only.
+MOST_DRAWN = 1e6
 FEW_DECADES = 100.0  #: of times, below which 2 and 5 are named, too
 MISSED = "#C00000"
 PALE = 0.3
@@ -180,7 +183,7 @@ def _label(m: Measure) -> str:
 
 def _staircase(priced: Priced) -> list[Measure]:
     """The ways that the line joins: of those with the fewest wrong answers of yes or no, the best for their time."""
-    known = [m for m in priced.measures if not math.isnan(m.worst)]
+    known = [m for m in priced.measures if m.worst <= MOST_DRAWN]
     if priced.unit:
         fewest = min((m.wrong for m in known), default=0)
         known = [m for m in known if m.wrong == fewest]
@@ -198,7 +201,7 @@ def figure(priced: Priced) -> bytes:
     from matplotlib.lines import Line2D
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    drawn = [m for m in priced.measures if not math.isnan(m.worst) and not math.isinf(m.worst)]
+    drawn = [m for m in priced.measures if m.worst <= MOST_DRAWN]
     if not drawn:
         return b""
     positive = [m.worst for m in drawn if m.worst > 0.0]
