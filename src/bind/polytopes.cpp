@@ -156,7 +156,7 @@ std::vector<Vec3> first_contacts(const MovingBodies& a, const MovingBodies& b, s
         const std::size_t place = i % kBoxMotionBlock;
         if (by_axes && place == 0) {
             decide_box_motions(a.rows(), b.rows(), i, std::min(count - i, kBoxMotionBlock), t_max,
-                               known.data());
+                               contact_set, known.data());
         }
         const PolytopeContact contact = [&] {
             if constexpr (std::is_same_v<Solver, PolytopeContactSolver>) {
@@ -222,7 +222,7 @@ nb::object box_motion_verdicts_world(const nb::tuple& side_a, const nb::tuple& s
         throw nb::value_error("box_motion_verdicts_world: not pairs of boxes");
     }
     std::vector<BoxMotion> known(count);
-    decide_box_motions(a.rows(), b.rows(), 0, count, t_max, known.data());
+    decide_box_motions(a.rows(), b.rows(), 0, count, t_max, false, known.data());
     const auto out = empty<std::uint8_t>({count});
     for (std::size_t i = 0; i < count; ++i) out.data[i] = static_cast<std::uint8_t>(known[i].verdict);
     return out.array;

@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include "geom/contact_points.hpp"
 #include "geom/core.hpp"
 #include "geom/double_double.hpp"
 #include "geom/exact_body.hpp"
@@ -86,6 +87,9 @@ constexpr double kWideSharp = 0x1p-60;
 // is off by 6 u |d| |w|, its length and the bounds by less than 10 u, which 2.08 for 2.06 and the rest cover.
 constexpr double kBallSquare = 2.08;
 constexpr double kBallError = 32 * kUnitRoundoff;
+
+// No slack for contact points (ContactSlack) is larger, in terms of the reach: kLargestSlack and what rounds.
+constexpr double kMostSlack = 2.0 * kLargestSlack;
 
 struct LaneBoxes {
     Four center, velocity;
@@ -382,9 +386,79 @@ bool refine_end(const MovingBoxes& a, const MovingBoxes& b, std::size_t pair, co
     return sure;
 }
 
+/// Four pairs that touch: a vertex on a face, or two edges that cross, are seen at once.
+///
+///     face of a: the vertex of b that is furthest against the normal; face of b: that of a along it
+///     edges e, f: p + s e = q + u f, where p and q are the middles of the edges, so with m = e x f
+///                 s = ((q - p) x f) . m / m . m,  u = ((q - p) x e) . m / m . m
+///
+/// Everything else, such as two faces or edges side by side, is left to ContactPoints.
+GEOMSRV_INLINE void add_points(const LaneBoxes& a, const LaneBoxes& b, const LanePair& pair,
+                               const Four& normal, const Four& product, BoxMotion* const (&row)[4]) {
+    const Lanes none = 0.0;
+    const Lanes axis(Lanes::Vector{static_cast<double>(row[0]->axis), static_cast<double>(row[1]->axis),
+                                   static_cast<double>(row[2]->axis), static_cast<double>(row[3]->axis)});
+    const Lanes time(Lanes::Vector{row[0]->time, row[1]->time, row[2]->time, row[3]->time});
+    const LaneMask face_a = axis < Lanes(3.0);
+    const LaneMask crossed = Lanes(5.0) < axis;
+    const LaneMask face_b = ~(face_a | crossed);
+    const Lanes level = Lanes(kStretch * kMostSlack) * pair.size;
+    const Lanes long_enough = Lanes(2.0) * level;
+
+    // What leads from the centre of a to the extreme vertex or the middle of the edge; of the others, whether
+    // they are beside the vertex by more than any slack, and long enough to be more than a point.
+    struct Arm {
+        Four sum, edge;
+        Lanes half;
+        LaneMask steep, all_long;
+    };
+    const auto arm_of = [&](const LaneBoxes& box, const Lanes& sign,
+                            const Lanes& own) __attribute__((always_inline)) {
+        Arm out{{none, none, none}, {none, none, none}, none, none <= none, none <= none};
+        for (int i = 0; i < 3; ++i) {
+            const LaneMask is_own =
+                crossed & (own <= Lanes(static_cast<double>(i))) & (Lanes(static_cast<double>(i)) <= own);
+            const Lanes height = dot(normal, box.edge[i]);
+            out.steep = out.steep & (is_own | (level < magnitude(height) * box.half[i]));
+            out.all_long = out.all_long & (long_enough < box.half[i]);
+            const Lanes part = kept(~is_own, with_sign_of(sign * height, box.half[i]));
+            out.sum = out.sum + part * box.edge[i];
+            out.edge = out.edge + kept(is_own, Lanes(1.0)) * box.edge[i];
+            out.half = out.half + kept(is_own, box.half[i]);
+        }
+        return out;
+    };
+    // Axis 6 + 3 i + j.
+    const LaneMask second = Lanes(8.0) < axis;
+    const LaneMask third = Lanes(11.0) < axis;
+    const Lanes of_a = select(third, Lanes(2.0), select(second, Lanes(1.0), none));
+    const Lanes of_b = axis - Lanes(6.0) - Lanes(3.0) * of_a;
+    const Arm arm_a = arm_of(a, Lanes(1.0), of_a);
+    const Arm arm_b = arm_of(b, Lanes(-1.0), of_b);
+
+    const Four between = pair.d + time * pair.w + (arm_b.sum - arm_a.sum);
+    const Lanes square = dot(product, product);
+    const Lanes s = dot(cross(between, arm_b.edge), product) / square;
+    const Lanes u = dot(cross(between, arm_a.edge), product) / square;
+    const LaneMask cross_inside =
+        (magnitude(s) < arm_a.half) & (magnitude(u) < arm_b.half) & (Lanes(kClearAngle) < square);
+    const LaneMask known =
+        (face_b & arm_a.steep) | (face_a & arm_b.steep & arm_a.all_long) |
+        (crossed & arm_a.steep & arm_b.steep & arm_a.all_long & arm_b.all_long & cross_inside);
+    const Four on_a = a.center + (arm_a.sum + kept(crossed, s) * arm_a.edge) + time * a.velocity;
+    const Four on_b = b.center + arm_b.sum + time * b.velocity;
+    const Four point = {select(face_a, on_b.x, on_a.x), select(face_a, on_b.y, on_a.y),
+                        select(face_a, on_b.z, on_a.z)};
+    const Lanes flag = select(known, Lanes(1.0), none);
+    for (int k = 0; k < 4; ++k) {
+        row[k]->lone = row[k]->verdict == BoxMotion::Verdict::will_touch && flag[k] != 0.0;
+        row[k]->point = {point.x[k], point.y[k], point.z[k]};
+    }
+}
+
 /// Four pairs; `row[k]` is where the k-th goes.
 GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBoxes& boxes_b,
-                                     const std::size_t (&index)[4], double t_max,
+                                     const std::size_t (&index)[4], double t_max, bool points,
                                      BoxMotion* const (&row)[4]) {
     LaneBoxes a;
     LaneBoxes b;
@@ -524,12 +598,12 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
         out.half[0] = edges.half[0];
         out.half[1] = edges.half[1];
     }
-    Four normal = {Lanes::load(product[0]), Lanes::load(product[1]), Lanes::load(product[2])};
-    const Lanes size = square_root(dot(normal, normal));
+    const Four raw = {Lanes::load(product[0]), Lanes::load(product[1]), Lanes::load(product[2])};
+    const Lanes size = square_root(dot(raw, raw));
     // From a to b is against the motion.  The sum leaves no zero of the wrong sign.
     const Lanes none = 0.0;
-    const Lanes length = with_sign_of(dot(normal, pair.w), -size);
-    normal = {normal.x / length + none, normal.y / length + none, normal.z / length + none};
+    const Lanes length = with_sign_of(dot(raw, pair.w), -size);
+    const Four normal = {raw.x / length + none, raw.y / length + none, raw.z / length + none};
     const Lanes closing = none - dot(normal, pair.w);
     for (int k = 0; k < 4; ++k) {
         BoxMotion& out = *row[k];
@@ -538,6 +612,7 @@ GEOMSRV_WIDE_CLONES void decide_four(const MovingBoxes& boxes_a, const MovingBox
         out.closing_speed = closing[k];
         out.sine = size[k];
     }
+    if (points) add_points(a, b, pair, normal, raw, row);
 }
 
 /// Verdict `never` where balls say so.
@@ -557,7 +632,7 @@ GEOMSRV_WIDE_CLONES void test_balls(const MovingBoxes& boxes_a, const MovingBoxe
 }  // namespace
 
 void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t first, std::size_t count,
-                        double t_max, BoxMotion* out) {
+                        double t_max, bool points, BoxMotion* out) {
     for (std::size_t from = 0; from < count; from += kBoxMotionBlock) {
         const std::size_t block = std::min(kBoxMotionBlock, count - from);
         std::int64_t misses[kBoxMotionBlock];
@@ -567,6 +642,7 @@ void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t 
         for (std::size_t k = 0; k < block; ++k) {
             out[from + k].verdict = BoxMotion::Verdict::never;
             out[from + k].wide = false;
+            out[from + k].lone = false;
             left[many] = from + k;
             many += misses[k] == 0 ? 1 : 0;
         }
@@ -578,7 +654,7 @@ void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t 
                 index[k] = first + which;
                 row[k] = out + which;
             }
-            decide_four(a, b, index, t_max, row);
+            decide_four(a, b, index, t_max, points, row);
         }
     }
 }

@@ -42,11 +42,13 @@ struct BoxMotion {
     double closing_speed = 0.0;  ///< [m/s], along the normal
     double half[2] = {};         ///< half lengths of the edges of that axis,
     double sine = 0.0;           ///< and the length of the product of their directions
+    bool lone = false;           ///< they touch in one point for certain:
+    Vec3 point;                  ///< [m], world frame
 };
 
-/// Pairs `first` to `first + count`.
+/// Pairs `first` to `first + count`; `points`: look for contact points, too.
 void decide_box_motions(const MovingBoxes& a, const MovingBoxes& b, std::size_t first, std::size_t count,
-                        double t_max, BoxMotion* out);
+                        double t_max, bool points, BoxMotion* out);
 
 /// How many pairs are best decided at once.
 inline constexpr std::size_t kBoxMotionBlock = 64;

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <tuple>
 
 #include "geom/convex_convex.hpp"
+#include "geom/lanes.hpp"
 #include "geom/line_cast.hpp"
 
 namespace geomsrv {
@@ -46,6 +49,63 @@ bool clip_part(double from, double to, double slack, double& first, double& last
     return true;
 }
 
+/// What planes leave of an edge, and which of them end it.
+struct Span {
+    double first = 0.0;
+    double last = 1.0;
+    int first_plane = -1;
+    int last_plane = -1;
+    bool any = true;
+};
+
+/// Heights of a hull's points along n, and the greatest.
+GEOMSRV_WIDE_CLONES double heights(const Core& core, Vec3 n, double* out) {
+    const double* const x = core.points;
+    const double* const y = x + core.count;
+    const double* const z = y + core.count;
+    Lanes top = -std::numeric_limits<double>::infinity();
+    for (int i = 0; i < core.count; i += Lanes::kCount) {
+        const Lanes height = Lanes(n.x) * Lanes::load(x + i) + Lanes(n.y) * Lanes::load(y + i) +
+                             Lanes(n.z) * Lanes::load(z + i);
+        height.store(out + i);
+        top = greater(top, height);
+    }
+    return greatest(top);
+}
+
+/// clip_part() by all planes, four at a time.
+GEOMSRV_WIDE_CLONES Span clip_edge(const std::vector<double> (&row)[6], Vec3 p, Vec3 q, double slack) {
+    Span out;
+    const Lanes most = slack;
+    for (std::size_t k = 0; k < row[0].size(); k += Lanes::kCount) {
+        const auto height = [&](Vec3 v) __attribute__((always_inline)) {
+            return Lanes::load(row[0].data() + k) * (Lanes(v.x) - Lanes::load(row[3].data() + k)) +
+                   Lanes::load(row[1].data() + k) * (Lanes(v.y) - Lanes::load(row[4].data() + k)) +
+                   Lanes::load(row[2].data() + k) * (Lanes(v.z) - Lanes::load(row[5].data() + k));
+        };
+        const Lanes from = height(p);
+        const Lanes to = height(q);
+        const LaneMask starts_out = most < from;
+        const LaneMask ends_out = most < to;
+        if (any(starts_out & ends_out)) {
+            out.any = false;
+            return out;
+        }
+        if (!any(starts_out | ends_out)) {
+            continue;
+        }
+        for (int i = 0; i < static_cast<int>(Lanes::kCount); ++i) {
+            const double first = out.first;
+            const double last = out.last;
+            clip_part(from[i], to[i], slack, out.first, out.last);
+            const int plane = static_cast<int>(k) + i;
+            out.first_plane = out.first > first ? plane : out.first_plane;
+            out.last_plane = out.last < last ? plane : out.last_plane;
+        }
+    }
+    return out;
+}
+
 }  // namespace
 
 /// Vertices of a body within the slack of the outermost, in the plane.
@@ -54,22 +114,36 @@ void ContactPoints::collect(const Core& core, int listed, Vec3 normal, double sl
     const Vec3 n = lowest ? -normal : normal;
     std::vector<Point>& out = face_[body];
     out.clear();
+    const auto add = [&](int i) {
+        const Vec3 v = vertex_of(core, i);
+        out.push_back({component(v, axis_[0]) + shift.x, component(v, axis_[1]) + shift.y, body, i, i, 0.0});
+    };
+    if (core.points != nullptr) {
+        heights_.resize(static_cast<std::size_t>(core.count));
+        const double top = heights(core, n, heights_.data());
+        for (int i = 0; i < listed; ++i) {
+            if (heights_[static_cast<std::size_t>(i)] >= top - slack) {
+                add(i);
+            }
+        }
+        return;
+    }
+    // A vertex across an edge that descends by twice the slack, which is some ten times what rounds, is not
+    // worth a look.
     const int highest_vertex = highest(core, n).vertex;
-    const double top = dot(n, vertex_of(core, highest_vertex));
-    // A box's vertex across an edge that descends by twice the slack, which is some ten times what rounds, is
-    // not worth a look.
+    const int every = (1 << core.generators) - 1;
     int steep = 0;
     for (int i = 0; i < core.generators; ++i) {
         steep |= (std::fabs(dot(n, core.generator[i])) > slack ? 1 : 0) << i;
     }
+    if (steep == every) {
+        add(highest_vertex);
+        return;
+    }
+    const double top = dot(n, vertex_of(core, highest_vertex));
     for (int i = 0; i < listed; ++i) {
-        if (((i ^ highest_vertex) & steep) != 0) {
-            continue;
-        }
-        const Vec3 v = vertex_of(core, i);
-        if (dot(n, v) >= top - slack) {
-            out.push_back(
-                {component(v, axis_[0]) + shift.x, component(v, axis_[1]) + shift.y, body, i, i, 0.0});
+        if (((i ^ highest_vertex) & steep) == 0 && dot(n, vertex_of(core, i)) >= top - slack) {
+            add(i);
         }
     }
 }
@@ -164,6 +238,24 @@ void ContactPoints::clip(const std::vector<Point>& ring, double slack) {
     }
 }
 
+/// Finds where two edges cross, if that is between their ends and not at a small angle.
+bool ContactPoints::cross_edges() {
+    const Point& p = face_[0][0];
+    const Point& q = face_[1][0];
+    const Vec2 e = {face_[0][1].x - p.x, face_[0][1].y - p.y};
+    const Vec2 f = {face_[1][1].x - q.x, face_[1][1].y - q.y};
+    const Vec2 between = {q.x - p.x, q.y - p.y};
+    const double turn = cross(e, f);
+    const double on_e = cross(between, f) / turn;
+    const double on_f = cross(between, e) / turn;
+    const bool clear = turn * turn > kClearAngle * (dot(e, e) * dot(f, f));
+    if (!(clear && on_e > 0.0 && on_e < 1.0 && on_f > 0.0 && on_f < 1.0)) {
+        return false;
+    }
+    found_.assign(1, {p.x + on_e * e.x, p.y + on_e * e.y, 0, p.from, face_[0][1].from, on_e});
+    return true;
+}
+
 Vec3 ContactPoints::world(const MovingPair& pair, const Point& point, double moment) const {
     const MovingBody& body = point.body == 0 ? pair.given_a() : pair.given_b();
     const Vec3 from = given_vertex(body.body, point.from);
@@ -189,22 +281,26 @@ std::span<const Vec3> ContactPoints::touching(const MovingPair& pair, Vec3 norma
     const bool moved = moment > 0.0;
     const Vec2 shift = {moved ? moment * component(w, axis_[0]) : 0.0,
                         moved ? moment * component(w, axis_[1]) : 0.0};
-    collect(pair.a(), pair.given_a().body.count(), normal, slack.height, 0, {}, false);
-    collect(pair.b(), pair.given_b().body.count(), normal, slack.height, 1, shift, true);
     found_.clear();
-    for (const std::vector<Point>& face : face_) {
-        const Point& first = face.front();
-        const bool lone = std::all_of(face.begin(), face.end(), [&](const Point& p) {
+    for (const int body : {0, 1}) {
+        const MovingBody& given = body == 0 ? pair.given_a() : pair.given_b();
+        collect(body == 0 ? pair.a() : pair.b(), given.body.count(), normal, slack.height, body,
+                body == 0 ? Vec2{} : shift, body == 1);
+        const Point first = face_[body].front();
+        const bool lone = std::all_of(face_[body].begin(), face_[body].end(), [&](const Point& p) {
             return std::fabs(p.x - first.x) <= slack.place && std::fabs(p.y - first.y) <= slack.place;
         });
-        if (lone && found_.empty()) {
-            found_.push_back(first);
+        if (lone) {
+            points_.assign(1, world(pair, first, moment));
+            return points_;
         }
     }
+    if (face_[0].size() == 2 && face_[1].size() == 2 && cross_edges()) {
+        points_.assign(1, world(pair, found_.front(), moment));
+        return points_;
+    }
     for (std::vector<Point>& face : face_) {
-        if (found_.empty()) {
-            hull(face, slack.place);
-        }
+        hull(face, slack.place);
     }
     // What misses by more than the slack, because its place is that much less certain, is sought with more.
     constexpr double kMoreSlack = 16.0;
@@ -226,15 +322,23 @@ std::span<const Vec3> ContactPoints::touching(const MovingPair& pair, Vec3 norma
 
 /// What bounds a polytope, in float64.  Two planes that meet at a sharp edge say, within a slack, little of
 /// how far the body goes there, so a third one stands across it; needles are cut off at both ends.
-void ContactPoints::bounds_of(const Core& core, const PolytopeFaces& faces) {
-    bounds_.clear();
+void ContactPoints::bounds_of(const Core& core, const PolytopeFaces& faces, Planes& out) {
+    out.normal.clear();
+    for (std::vector<double>& row : out.row) {
+        row.clear();
+    }
+    const auto add_at = [&](Vec3 normal, Vec3 base) {
+        out.normal.push_back(normal);
+        const double numbers[] = {normal.x, normal.y, normal.z, base.x, base.y, base.z};
+        for (std::size_t k = 0; k < std::size(numbers); ++k) {
+            out.row[k].push_back(numbers[k]);
+        }
+    };
+    const auto add = [&](Vec3 normal) { add_at(normal, vertex_of(core, highest(core, normal).vertex)); };
     for (const FacePlane& plane : faces.planes()) {
-        bounds_.push_back({faces.rough_normal(plane), vertex_of(core, plane.i)});
+        add_at(faces.rough_normal(plane), vertex_of(core, plane.i));
     }
     const int count = faces.exact().count();
-    const auto add = [&](Vec3 normal) {
-        bounds_.push_back({normal, vertex_of(core, highest(core, normal).vertex)});
-    };
     Vec3 middle;
     Vec3 longest;
     for (int i = 0; i < count; ++i) {
@@ -251,8 +355,8 @@ void ContactPoints::bounds_of(const Core& core, const PolytopeFaces& faces) {
         if (edge.beside[0] < 0) {
             continue;
         }
-        const Vec3 n = bounds_[static_cast<std::size_t>(edge.beside[0])].normal;
-        if (!(dot(n, bounds_[static_cast<std::size_t>(edge.beside[1])].normal) < 0.0)) {
+        const Vec3 n = out.normal[static_cast<std::size_t>(edge.beside[0])];
+        if (!(dot(n, out.normal[static_cast<std::size_t>(edge.beside[1])]) < 0.0)) {
             continue;
         }
         const Vec3 from = vertex_of(core, edge.from);
@@ -263,6 +367,89 @@ void ContactPoints::bounds_of(const Core& core, const PolytopeFaces& faces) {
             add(dot(m, middle - from) > 0.0 ? -m : m);
         }
     }
+    while (out.row[0].size() % Lanes::kCount != 0) {
+        for (std::vector<double>& row : out.row) {
+            row.push_back(0.0);
+        }
+    }
+}
+
+/// Ends of what is left of the edges of a body between the planes of the other.
+void ContactPoints::add_corners(const MovingPair& pair, int body, double slack) {
+    const Core& core = body == 0 ? pair.a() : pair.b();
+    const std::vector<Vec3>& own = bounds_[body].normal;
+    const Planes& other = bounds_[1 - body];
+    outward_.assign(static_cast<std::size_t>(faces_[body].exact().count()), {});
+    const auto beside = [&](const FaceEdge& edge) {
+        const auto normal = [&](int plane) {
+            return plane < 0 ? Vec3{} : own[static_cast<std::size_t>(plane)];
+        };
+        return normal(edge.beside[0]) + normal(edge.beside[1]);
+    };
+    for (const FaceEdge& edge : faces_[body].edges()) {
+        for (const int end : {edge.from, edge.to}) {
+            Vec3& outward = outward_[static_cast<std::size_t>(end)];
+            outward = outward + beside(edge);
+        }
+    }
+    for (const FaceEdge& edge : faces_[body].edges()) {
+        const Vec3 p = vertex_of(core, edge.from);
+        const Vec3 q = vertex_of(core, edge.to);
+        const Span left = clip_edge(other.row, p, q, slack);
+        if (!left.any || (left.first - left.last) * norm(q - p) > slack) {
+            continue;
+        }
+        const auto add = [&](double part, int plane) {
+            const int from = part == 1.0 ? edge.to : edge.from;
+            const int to = part == 0.0 ? edge.from : edge.to;
+            const bool vertex = from == to;
+            const Vec3 start = vertex_of(core, from);
+            Vec3 outward = vertex ? outward_[static_cast<std::size_t>(from)] : beside(edge);
+            if (!vertex && plane >= 0) {
+                outward = outward + other.normal[static_cast<std::size_t>(plane)];
+            }
+            corners_.push_back(
+                {{0.0, 0.0, body, from, to, part}, start + part * (vertex_of(core, to) - start), outward});
+        };
+        const bool ordered = left.first <= left.last;
+        add(ordered ? left.first : left.last, ordered ? left.first_plane : left.last_plane);
+        add(ordered ? left.last : left.first, ordered ? left.last_plane : left.first_plane);
+    }
+}
+
+/// Whether a plane certainly has the corner more than the slack away from the hull of the others: a quick
+/// test, which most corners pass.
+bool ContactPoints::stands_out(std::size_t corner, double slack) const {
+    const double length = norm(corners_[corner].outward);
+    if (!(length > 0.0)) {
+        return false;
+    }
+    const Vec3 n = (1.0 / length) * corners_[corner].outward;
+    // Twice the slack, which is more than what rounds.
+    return std::all_of(corners_.begin(), corners_.end(), [&](const Corner& other) {
+        return &other == &corners_[corner] || dot(n, corners_[corner].place - other.place) > 2.0 * slack;
+    });
+}
+
+bool ContactPoints::is_in_hull_of_others(std::size_t corner, double reach, double slack) {
+    const std::size_t others = corners_.size() - 1;
+    rows_.resize(3 * others);
+    for (std::size_t k = 0, row = 0; k < corners_.size(); ++k) {
+        if (k != corner) {
+            rows_[row] = corners_[k].place.x;
+            rows_[others + row] = corners_[k].place.y;
+            rows_[2 * others + row] = corners_[k].place.z;
+            ++row;
+        }
+    }
+    Core one;
+    one.center = corners_[corner].place;
+    one.reach = reach;
+    Core hull_of_others;
+    hull_of_others.points = rows_.data();
+    hull_of_others.count = static_cast<int>(others);
+    hull_of_others.reach = reach;
+    return convex_convex(one, hull_of_others, false).value <= slack;
 }
 
 std::span<const Vec3> ContactPoints::overlapping(const MovingPair& pair, double slack) {
@@ -270,68 +457,29 @@ std::span<const Vec3> ContactPoints::overlapping(const MovingPair& pair, double 
     const MovingBody* const given[2] = {&pair.given_a(), &pair.given_b()};
     for (const int body : {0, 1}) {
         faces_[body].load({given[body]->body, *core[body]}, pair.ordinary());
+        bounds_of(*core[body], faces_[body], bounds_[body]);
     }
-    found_.clear();
-    for (const int body : {0, 1}) {
-        bounds_of(*core[1 - body], faces_[1 - body]);
-        for (const FaceEdge& edge : faces_[body].edges()) {
-            const Vec3 p = vertex_of(*core[body], edge.from);
-            const Vec3 q = vertex_of(*core[body], edge.to);
-            double first = 0.0;
-            double last = 1.0;
-            bool left = true;
-            for (std::size_t i = 0; i < bounds_.size() && left; ++i) {
-                const Plane& plane = bounds_[i];
-                left = clip_part(dot(plane.normal, p - plane.base), dot(plane.normal, q - plane.base), slack,
-                                 first, last);
-            }
-            if (!left || (first - last) * norm(q - p) > slack) {
-                continue;
-            }
-            for (const double part : {std::min(first, last), std::max(first, last)}) {
-                const int from = part == 1.0 ? edge.to : edge.from;
-                const int to = part == 0.0 ? edge.from : edge.to;
-                found_.push_back({0.0, 0.0, body, from, to, part});
-            }
-        }
-    }
+    corners_.clear();
+    add_corners(pair, 0, slack);
+    add_corners(pair, 1, slack);
+    // A vertex ends several edges.
+    std::sort(corners_.begin(), corners_.end(),
+              [](const Corner& p, const Corner& q) { return vertices_first(q.point, p.point); });
+    const auto last = std::unique(corners_.begin(), corners_.end(), [](const Corner& p, const Corner& q) {
+        return !vertices_first(p.point, q.point) && !vertices_first(q.point, p.point);
+    });
+    corners_.erase(last, corners_.end());
     // Points within the slack of the hull of the others go; crossings first.
-    std::sort(found_.begin(), found_.end(),
-              [](const Point& p, const Point& q) { return vertices_first(q, p); });
-    std::vector<Vec3> local;
-    for (const Point& point : found_) {
-        const Vec3 from = vertex_of(*core[point.body], point.from);
-        const Vec3 to = vertex_of(*core[point.body], point.to);
-        local.push_back(from + point.part * (to - from));
-    }
-    for (std::size_t i = 0; i < found_.size() && found_.size() > 1;) {
-        const std::size_t others = found_.size() - 1;
-        rows_.resize(3 * others);
-        for (std::size_t k = 0, row = 0; k < local.size(); ++k) {
-            if (k != i) {
-                rows_[row] = local[k].x;
-                rows_[others + row] = local[k].y;
-                rows_[2 * others + row] = local[k].z;
-                ++row;
-            }
-        }
-        Core one;
-        one.center = local[i];
-        one.reach = pair.reach();
-        Core hull_of_others;
-        hull_of_others.points = rows_.data();
-        hull_of_others.count = static_cast<int>(others);
-        hull_of_others.reach = pair.reach();
-        if (convex_convex(one, hull_of_others, false).value <= slack) {
-            found_.erase(found_.begin() + static_cast<std::ptrdiff_t>(i));
-            local.erase(local.begin() + static_cast<std::ptrdiff_t>(i));
+    for (std::size_t i = 0; i < corners_.size() && corners_.size() > 1;) {
+        if (!stands_out(i, slack) && is_in_hull_of_others(i, pair.reach(), slack)) {
+            corners_.erase(corners_.begin() + static_cast<std::ptrdiff_t>(i));
         } else {
             ++i;
         }
     }
     points_.clear();
-    for (const Point& point : found_) {
-        points_.push_back(world(pair, point, 0.0));
+    for (const Corner& corner : corners_) {
+        points_.push_back(world(pair, corner.point, 0.0));
     }
     return points_;
 }

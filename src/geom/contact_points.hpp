@@ -22,6 +22,10 @@ struct ContactSlack {
     double place;   ///< in it
 };
 
+// Squared sine of the angle above which two edges share one point: what a slack moves across one of them then
+// moves no further than eight times that along the other.
+inline constexpr double kClearAngle = 0x1p-6;
+
 class ContactPoints {
 public:
     /// Bodies that touch along a unit normal, `moment` after the start in the units of the pair.  The points
@@ -44,26 +48,42 @@ private:
         double nx, ny, offset;  ///< nx x + ny y <= offset, unit normal
     };
 
-    struct Plane {
-        Vec3 normal;  ///< unit, outward
-        Vec3 base;
+    /// Planes that bound a body: unit outward normals and a point of each, by coordinates; padded to whole
+    /// lanes by planes that nothing is outside of.
+    struct Planes {
+        std::vector<Vec3> normal;
+        std::vector<double> row[6];
+    };
+
+    /// A point of two overlapping bodies, and a direction in which it is likely to be the furthest.
+    struct Corner {
+        Point point;
+        Vec3 place;
+        Vec3 outward;
     };
 
     void collect(const Core& core, int listed, Vec3 normal, double slack, int body, Vec2 shift, bool lowest);
     static bool vertices_first(const Point& p, const Point& q);
     void hull(std::vector<Point>& points, double slack);
+    bool cross_edges();
     void sides_of(const std::vector<Point>& ring);
     void clip(const std::vector<Point>& ring, double slack);
-    void bounds_of(const Core& core, const PolytopeFaces& faces);
+    static void bounds_of(const Core& core, const PolytopeFaces& faces, Planes& out);
+    void add_corners(const MovingPair& pair, int body, double slack);
+    [[nodiscard]] bool stands_out(std::size_t corner, double slack) const;
+    [[nodiscard]] bool is_in_hull_of_others(std::size_t corner, double reach, double slack);
     [[nodiscard]] Vec3 world(const MovingPair& pair, const Point& point, double moment) const;
 
     int axis_[2] = {0, 1};
+    std::vector<double> heights_;
     std::vector<Point> face_[2];
     std::vector<Point> found_;
     std::vector<Point> chain_;
     std::vector<Side> sides_;
     PolytopeFaces faces_[2];
-    std::vector<Plane> bounds_;
+    Planes bounds_[2];
+    std::vector<Vec3> outward_;  // of each vertex of a body
+    std::vector<Corner> corners_;
     std::vector<double> rows_;
     std::vector<Vec3> points_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "geom/lanes.hpp"
 #include "geom/rounding.hpp"
@@ -76,6 +77,37 @@ GEOMSRV_INLINE int top_of_points(const Core& core, Vec3 n) {
     return static_cast<int>(least(select(best < Lanes(greatest(best)), none, where)));
 }
 
+/// The same along two directions at once: one pass, and neither waits for the other.
+GEOMSRV_INLINE std::pair<int, int> tops_of_points(const Core& core, Vec3 n, Vec3 m) {
+    constexpr int kLanes = Lanes::kCount;
+    const double* const x = core.points;
+    const double* const y = x + core.count;
+    const double* const z = y + core.count;
+    const auto value = [&](Vec3 along, int i) __attribute__((always_inline)) {
+        return Lanes(along.x) * Lanes::load(x + i) + Lanes(along.y) * Lanes::load(y + i) +
+               Lanes(along.z) * Lanes::load(z + i);
+    };
+    Lanes index(Lanes::Vector{0.0, 1.0, 2.0, 3.0});
+    Lanes best_n = value(n, 0);
+    Lanes best_m = value(m, 0);
+    Lanes where_n = index;
+    Lanes where_m = index;
+    for (int i = kLanes; i < core.count; i += kLanes) {
+        index = index + Lanes(kLanes);
+        const Lanes along_n = value(n, i);
+        const Lanes along_m = value(m, i);
+        const LaneMask better_n = best_n < along_n;
+        const LaneMask better_m = best_m < along_m;
+        best_n = select(better_n, along_n, best_n);
+        best_m = select(better_m, along_m, best_m);
+        where_n = select(better_n, index, where_n);
+        where_m = select(better_m, index, where_m);
+    }
+    const Lanes none = static_cast<double>(core.count);
+    return {static_cast<int>(least(select(best_n < Lanes(greatest(best_n)), none, where_n))),
+            static_cast<int>(least(select(best_m < Lanes(greatest(best_m)), none, where_m)))};
+}
+
 GEOMSRV_INLINE int top_of(const Core& core, Vec3 n) {
     if (core.points != nullptr) {
         return top_of_points(core, n);
@@ -85,6 +117,13 @@ GEOMSRV_INLINE int top_of(const Core& core, Vec3 n) {
         vertex |= (dot(n, core.generator[i]) > 0.0 ? 1 : 0) << i;
     }
     return vertex;
+}
+
+GEOMSRV_INLINE std::pair<int, int> tops_of(const Core& core, Vec3 n, Vec3 m) {
+    if (core.points != nullptr) {
+        return tops_of_points(core, n, m);
+    }
+    return {top_of(core, n), top_of(core, m)};
 }
 
 GEOMSRV_INLINE double component(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
@@ -146,8 +185,7 @@ public:
             return out;
         }
         out.portals = true;
-        descend(around, 1.0, out.enter);
-        descend(around, -1.0, out.leave);
+        descend(around, out);
         if (out.enter.sure && out.leave.sure) {
             out.outcome = LineCast::Outcome::meets;
         }
@@ -156,9 +194,16 @@ public:
 
 private:
     /// Lowest along n.
-    GEOMSRV_INLINE Corner lowest(Vec3 n) const {
-        const int p = top_of(a_, n);
-        const int q = top_of(b_, -n);
+    GEOMSRV_INLINE Corner lowest(Vec3 n) const { return corner(n, top_of(a_, n), top_of(b_, -n)); }
+
+    GEOMSRV_INLINE std::pair<Corner, Corner> lowest(Vec3 n, Vec3 m) const {
+        const auto [p, r] = tops_of(a_, n, m);
+        const auto [q, s] = tops_of(b_, -n, -m);
+        return {corner(n, p, q), corner(m, r, s)};
+    }
+
+    /// Vertices p of a and q of b, lowest along n.
+    GEOMSRV_INLINE Corner corner(Vec3 n, int p, int q) const {
         Vec3 v = vertex_of(b_, q) - vertex_of(a_, p);
         if constexpr (Wide) {
             v = v + lowest_margin(n, margin_);
@@ -181,8 +226,7 @@ private:
         if (misses(m, first, out)) return false;
         const Vec2 f = first.flat;
         if (std::fabs(f.x) + std::fabs(f.y) <= doubt) return false;
-        Corner left = lowest_across({f.y, -f.x});
-        Corner right = lowest_across({-f.y, f.x});
+        auto [left, right] = lowest(across_.lift({f.y, -f.x}), across_.lift({-f.y, f.x}));
         if (misses({f.y, -f.x}, left, out) || misses({-f.y, f.x}, right, out)) return false;
         Corner middle = first;
         for (int step = 0; step < kMostSteps; ++step) {
@@ -248,20 +292,29 @@ private:
         return gg >= ee && gg >= ff ? n : ff >= ee ? cross(e, g) : cross(f, g);
     }
 
-    /// To the facet where the line enters (side 1) or leaves K (-1).
-    GEOMSRV_INLINE void descend(const Triangle& start, double side, Portal& out) const {
-        Corner c[3] = {start.corner[0], start.corner[1], start.corner[2]};
-        bool settled = false;
+    /// On the way to the facet where the line enters (side 1) or leaves K (-1).
+    struct Descent {
+        double side;
+        Corner c[3];
         Vec3 n;
-        Corner low = c[0];
-        for (int step = 0; step < kMostSteps; ++step) {
-            // Counter-clockwise about w: the product is along w, on the side where the line leaves.
-            n = -side * normal_of(c);
+        Corner low;
+        bool settled = false;
+        bool ended = false;
+
+        GEOMSRV_INLINE Descent(const Triangle& start, double which)
+            : side(which), c{start.corner[0], start.corner[1], start.corner[2]}, low(start.corner[0]) {}
+
+        /// Counter-clockwise about w: the product is along w, on the side where the line leaves.
+        GEOMSRV_INLINE void aim() { n = -side * normal_of(c); }
+
+        /// `next`: the lowest along n.
+        GEOMSRV_INLINE void step(const Corner& next, double reach) {
+            low = next;
             const double size = std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z);
-            low = lowest(n);
-            if (!(dot(n, low.v - c[0].v) < -kSettled * reach_ * size)) {
+            if (!(dot(n, low.v - c[0].v) < -kSettled * reach * size)) {
                 settled = size > 0.0;
-                break;
+                ended = true;
+                return;
             }
             // The line is between two corners and what is opposite to the new one; it replaces the third.
             // Which one that is cannot be predicted, so it is not a branch.
@@ -269,15 +322,42 @@ private:
             const bool left1 = cross(low.flat, c[1].flat) >= 0.0;
             const bool left2 = cross(low.flat, c[2].flat) >= 0.0;
             if (left0 == left1 && left1 == left2) {
-                break;
+                ended = true;
+                return;
             }
             c[(left0 & !left1) ? 2 : (left1 & !left2) ? 0 : 1] = low;
         }
+    };
+
+    /// To both facets at once: each step waits for the one before, so two ways cost little more than one.
+    GEOMSRV_INLINE void descend(const Triangle& start, LineCast& out) const {
+        Descent enter(start, 1.0);
+        Descent leave(start, -1.0);
+        int step = 0;
+        for (; step < kMostSteps && !(enter.ended || leave.ended); ++step) {
+            enter.aim();
+            leave.aim();
+            const auto [first, second] = lowest(enter.n, leave.n);
+            enter.step(first, reach_);
+            leave.step(second, reach_);
+        }
+        Descent& other = enter.ended ? leave : enter;
+        for (; step < kMostSteps && !other.ended; ++step) {
+            other.aim();
+            other.step(lowest(other.n), reach_);
+        }
+        set_portal(enter, out.enter);
+        set_portal(leave, out.leave);
+    }
+
+    GEOMSRV_INLINE void set_portal(const Descent& at, Portal& out) const {
+        const Corner(&c)[3] = at.c;
         out.corner[0] = c[0].id;
         out.corner[1] = c[1].id;
         out.corner[2] = c[2].id;
+        const Vec3 n = at.n;
         const double length = norm(n);
-        if (!settled || !(length > 0.0)) {
+        if (!at.settled || !(length > 0.0)) {
             return;
         }
         out.normal = {n.x / length, n.y / length, n.z / length};
@@ -285,7 +365,7 @@ private:
         const double h1 = dot(out.normal, c[1].v);
         const double h2 = dot(out.normal, c[2].v);
         const double errors = a_.error + b_.error;
-        out.height = std::min({h0, h1, h2, dot(out.normal, low.v)});
+        out.height = std::min({h0, h1, h2, dot(out.normal, at.low.v)});
         out.lowest = out.height - (kLowestError * reach_ + errors);
         out.highest = std::max({h0, h1, h2}) + (kCornerError * reach_ + errors);
         out.rate = -dot(out.normal, w_);
@@ -294,7 +374,7 @@ private:
         const double doubt = kAreaError * reach_ * reach_ + 4.0 * errors * reach_;
         out.settled = true;
         out.sure = cross(c[0].flat, c[1].flat) > doubt && cross(c[1].flat, c[2].flat) > doubt &&
-                   cross(c[2].flat, c[0].flat) > doubt && side * out.rate > out.rate_error;
+                   cross(c[2].flat, c[0].flat) > doubt && at.side * out.rate > out.rate_error;
     }
 
     const Core& a_;

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "geom/core.hpp"
 #include "geom/exact_direction.hpp"
+#include "geom/place.hpp"
 #include "geom/rounding.hpp"
 #include "geom/separation.hpp"
 
@@ -19,6 +21,11 @@ namespace {
 // of itself.
 constexpr double kArmError = 20 * kUnitRoundoff;
 
+// A normal that is at least so large, in terms of its edges, is known to a share of 2^-60: in double-double
+// each entry is off by 2^-98 of the edges' product (two products and a difference, 2^-102 each of up to twice
+// that).
+constexpr double kPlainNormal = 0x1p-38;
+
 constexpr int kBoxCorners = 8;
 
 double size_of(Vec3 v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); }
@@ -29,6 +36,21 @@ Vec3 PolytopeFaces::point(int i) const { return vertex_of(*rough_, i); }
 
 Vec3 PolytopeFaces::rough_normal(const FacePlane& plane) const {
     Vec3 n;
+    const bool plain = ordinary_ && exact_->kind == ExactBody::Kind::hull && exact_->is_unmoved() &&
+                       plane.kind == FacePlane::Kind::facet;
+    if (plain) {
+        // Listed points are exact, so double-double does, unless most of it cancels.
+        const auto step = [&](int to) {
+            return exact_difference(exact_->listed_point(to), exact_->listed_point(plane.i));
+        };
+        const WideVec3 e = step(plane.j);
+        const WideVec3 f = step(plane.k);
+        n = narrow(cross(e, f));
+        const double size = largest_of(n);
+        if (size > kPlainNormal * (largest_of(narrow(e)) * largest_of(narrow(f)))) {
+            return normalized((plane.sign / size) * n);
+        }
+    }
     if (!ordinary_ || !round_direction(normal<Enclosed>(plane), n)) {
         const VectorOf<Exact> exact = normal<Exact>(plane);
         if (sign_of(exact.x) == 0 && sign_of(exact.y) == 0 && sign_of(exact.z) == 0) {
@@ -51,26 +73,34 @@ int PolytopeFaces::sign(const F& f) const {
     return sign_of(f.template operator()<Exact>());
 }
 
-/// +1 where l lies on the side of i j k to which (j - i) x (k - i) points.
-int PolytopeFaces::orientation(int i, int j, int k, int l) const {
-    const Vec3 base = point(i);
-    const Vec3 e = point(j) - base;
-    const Vec3 f = point(k) - base;
-    const Vec3 g = point(l) - base;
-    const double det = dot(cross(e, f), g);
-    const double size_e = size_of(e);
-    const double size_f = size_of(f);
-    const double size_g = size_of(g);
-    const double doubt = (kArmError * rough_->reach + 4.0 * rough_->error) *
-                         (size_e * size_f + size_f * size_g + size_e * size_g);
-    if (std::fabs(det) > doubt) {
-        return det > 0.0 ? 1 : -1;
-    }
+PolytopeFaces::Triangle PolytopeFaces::triangle(int i, int j, int k) const {
+    Triangle t{{i, j, k}, -1, point(i), {}};
+    const Vec3 e = point(j) - t.base;
+    const Vec3 f = point(k) - t.base;
+    t.normal = cross(e, f);
+    t.product = size_of(e) * size_of(f);
+    t.sum = size_of(e) + size_of(f);
+    return t;
+}
+
+/// +1 where l lies on the side to which the triangle's normal points.
+int PolytopeFaces::orientation(const Triangle& t, int l) const {
+    const int known = rough_orientation(t, point(l));
+    return known != 0 ? known : exact_orientation(t, l);
+}
+
+/// The same in float64, of a rounded vertex; 0 where that cannot tell.
+int PolytopeFaces::rough_orientation(const Triangle& t, Vec3 l) const {
+    const Vec3 g = l - t.base;
+    const double det = dot(t.normal, g);
+    const double doubt = doubt_ * (t.product + t.sum * size_of(g));
+    return det > doubt ? 1 : det < -doubt ? -1 : 0;
+}
+
+int PolytopeFaces::exact_orientation(const Triangle& t, int l) const {
     return sign([&]<class N>() {
-        const VectorOf<N> p = vertex_times_denominator<N>(*exact_, i);
-        return dot(
-            cross(vertex_times_denominator<N>(*exact_, j) - p, vertex_times_denominator<N>(*exact_, k) - p),
-            vertex_times_denominator<N>(*exact_, l) - p);
+        const auto step = [&](int to) { return step_times_denominator<N>(*exact_, t.corner[0], to); };
+        return dot(cross(step(t.corner[1]), step(t.corner[2])), step(l));
     });
 }
 
@@ -78,6 +108,7 @@ void PolytopeFaces::load(const ExactAndRough& body, bool ordinary) {
     exact_ = &body.exact;
     rough_ = &body.rough;
     ordinary_ = ordinary;
+    doubt_ = kArmError * rough_->reach + 4.0 * rough_->error;
     planes_.clear();
     edges_.clear();
     const bool box = exact_->kind == ExactBody::Kind::zonotope && exact_->generators == 3 &&
@@ -278,10 +309,8 @@ void PolytopeFaces::load_polygon(int i, int j, int k) {
 
 /// A triangle with the vertex `inside` below it.
 void PolytopeFaces::add(int i, int j, int k, int inside) {
-    if (orientation(i, j, k, inside) > 0) {
-        std::swap(i, j);
-    }
-    triangles_.push_back({{i, j, k}});
+    const Triangle t = triangle(i, j, k);
+    triangles_.push_back(orientation(t, inside) > 0 ? triangle(j, i, k) : t);
 }
 
 void PolytopeFaces::load_solid(const int (&start)[4]) {
@@ -299,11 +328,17 @@ void PolytopeFaces::load_solid(const int (&start)[4]) {
 
 /// Replaces what is seen from a point by triangles from it to the horizon.
 void PolytopeFaces::insert(int x) {
-    kept_.clear();
     horizon_.clear();
-    for (const Triangle& t : triangles_) {
-        if (orientation(t.corner[0], t.corner[1], t.corner[2], x) <= 0) {
-            kept_.push_back(t);
+    const Vec3 place = point(x);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+        const Triangle& t = triangles_[i];
+        const int known = rough_orientation(t, place);
+        if (known < 0 || (known == 0 && exact_orientation(t, x) <= 0)) {
+            if (kept != i) {
+                triangles_[kept] = t;
+            }
+            ++kept;
             continue;
         }
         for (int k = 0; k < 3; ++k) {
@@ -322,26 +357,40 @@ void PolytopeFaces::insert(int x) {
     if (horizon_.empty()) {
         return;
     }
+    triangles_.resize(kept);
     // Seen triangles were counter-clockwise from outside, so their edges run the right way round for the new
     // ones.
     for (const FaceEdge& e : horizon_) {
-        kept_.push_back({{e.from, e.to, x}});
+        triangles_.push_back(triangle(e.from, e.to, x));
     }
-    std::swap(triangles_, kept_);
+}
+
+/// Every side of a triangle runs back in exactly one other.
+void PolytopeFaces::find_neighbours() {
+    const auto start = [&](std::size_t side) { return triangles_[side / 3].corner[side % 3]; };
+    const auto end = [&](std::size_t side) { return triangles_[side / 3].corner[(side + 1) % 3]; };
+    const std::size_t sides = 3 * triangles_.size();
+    first_side_.assign(static_cast<std::size_t>(exact_->count()), -1);
+    next_side_.resize(sides);
+    twin_.assign(sides, -1);
+    for (std::size_t side = 0; side < sides; ++side) {
+        int& first = first_side_[static_cast<std::size_t>(start(side))];
+        next_side_[side] = std::exchange(first, static_cast<int>(side));
+    }
+    for (std::size_t side = 0; side < sides; ++side) {
+        int other = first_side_[static_cast<std::size_t>(end(side))];
+        while (other >= 0 && end(static_cast<std::size_t>(other)) != start(side)) {
+            other = next_side_[static_cast<std::size_t>(other)];
+        }
+        twin_[side] = other;
+    }
 }
 
 /// Triangles in one plane become one facet; edges between them go.
 void PolytopeFaces::merge() {
-    const auto across = [&](const Triangle& t, int from, int to) {
-        for (int k = 0; k < 3; ++k) {
-            if (t.corner[k] == to && t.corner[(k + 1) % 3] == from) {
-                return t.corner[(k + 2) % 3];
-            }
-        }
-        return -1;
-    };
+    find_neighbours();
     // Spread each plane over its triangles.
-    std::vector<int> open;
+    pieces_.clear();
     for (std::size_t seed = 0; seed < triangles_.size(); ++seed) {
         if (triangles_[seed].plane >= 0) {
             continue;
@@ -349,50 +398,49 @@ void PolytopeFaces::merge() {
         const auto& c = triangles_[seed].corner;
         const int plane = static_cast<int>(planes_.size());
         planes_.push_back({FacePlane::Kind::facet, c[0], c[1], c[2], 1});
+        pieces_.push_back(1);
         triangles_[seed].plane = plane;
-        open.assign(1, static_cast<int>(seed));
-        while (!open.empty()) {
-            const Triangle t = triangles_[static_cast<std::size_t>(open.back())];
-            open.pop_back();
-            for (int k = 0; k < 3; ++k) {
-                const int from = t.corner[k];
-                const int to = t.corner[(k + 1) % 3];
-                for (std::size_t other = 0; other < triangles_.size(); ++other) {
-                    const int opposite = across(triangles_[other], from, to);
-                    if (opposite < 0) {
-                        continue;
-                    }
-                    if (triangles_[other].plane < 0 &&
-                        orientation(t.corner[0], t.corner[1], t.corner[2], opposite) == 0) {
-                        triangles_[other].plane = plane;
-                        open.push_back(static_cast<int>(other));
-                    }
-                    break;
+        open_.assign(1, static_cast<int>(seed));
+        while (!open_.empty()) {
+            const auto triangle = static_cast<std::size_t>(open_.back());
+            open_.pop_back();
+            for (std::size_t k = 0; k < 3; ++k) {
+                const int side = twin_[3 * triangle + k];
+                if (side < 0) {
+                    continue;
+                }
+                Triangle& other = triangles_[static_cast<std::size_t>(side / 3)];
+                const int opposite = other.corner[(side + 2) % 3];
+                if (other.plane < 0 && orientation(triangles_[triangle], opposite) == 0) {
+                    other.plane = plane;
+                    ++pieces_[static_cast<std::size_t>(plane)];
+                    open_.push_back(side / 3);
                 }
             }
         }
     }
-    for (const Triangle& t : triangles_) {
-        for (int k = 0; k < 3; ++k) {
-            const int from = t.corner[k];
-            const int to = t.corner[(k + 1) % 3];
-            if (from > to) {
-                continue;
-            }
-            for (const Triangle& other : triangles_) {
-                if (across(other, from, to) >= 0) {
-                    if (other.plane != t.plane) {
-                        join({from, to, {std::min(t.plane, other.plane), std::max(t.plane, other.plane)}});
-                    }
-                    break;
-                }
-            }
+    for (std::size_t side = 0; side < twin_.size(); ++side) {
+        const Triangle& t = triangles_[side / 3];
+        const int from = t.corner[side % 3];
+        const int to = t.corner[(side + 1) % 3];
+        if (from > to || twin_[side] < 0) {
+            continue;
+        }
+        const int plane = triangles_[static_cast<std::size_t>(twin_[side] / 3)].plane;
+        if (plane != t.plane) {
+            join({from, to, {std::min(t.plane, plane), std::max(t.plane, plane)}});
         }
     }
 }
 
 /// Two planes have one edge in common, however many vertices are on it.
 void PolytopeFaces::join(const FaceEdge& piece) {
+    // What a single triangle shares with another plane is one of its sides, in one piece.
+    const auto lone = [&](int plane) { return pieces_[static_cast<std::size_t>(plane)] == 1; };
+    if (lone(piece.beside[0]) || lone(piece.beside[1])) {
+        edges_.push_back(piece);
+        return;
+    }
     for (FaceEdge& edge : edges_) {
         if (edge.beside[0] != piece.beside[0] || edge.beside[1] != piece.beside[1]) {
             continue;

@@ -59,12 +59,24 @@ public:
     [[nodiscard]] Vec3 rough_normal(const FacePlane& plane) const;
 
 private:
+    /// Counter-clockwise from outside.  What the side of a point is told by is found once.
     struct Triangle {
         int corner[3];
         int plane = -1;
+        Vec3 base;             ///< its first corner
+        Vec3 normal;           ///< of no particular length
+        double product = 0.0;  ///< of the sizes of the two edges that the normal is made of
+        double sum = 0.0;      ///< and theirs
     };
 
-    int orientation(int i, int j, int k, int l) const;
+    [[nodiscard]] Triangle triangle(int i, int j, int k) const;
+    [[nodiscard]] int orientation(const Triangle& t, int l) const;
+    [[nodiscard]] int rough_orientation(const Triangle& t, Vec3 l) const;
+    [[nodiscard]] int exact_orientation(const Triangle& t, int l) const;
+    [[nodiscard]] int orientation(int i, int j, int k, int l) const {
+        return orientation(triangle(i, j, k), l);
+    }
+    void find_neighbours();
     template <class F>
     int sign(const F& f) const;
     [[nodiscard]] Vec3 point(int i) const;
@@ -81,35 +93,40 @@ private:
     const ExactBody* exact_ = nullptr;
     const Core* rough_ = nullptr;
     bool ordinary_ = false;
+    double doubt_ = 0.0;  // of an arm between two rounded vertices
     std::vector<FacePlane> planes_;
     std::vector<FaceEdge> edges_;
     std::vector<Triangle> triangles_;
-    std::vector<Triangle> kept_;
     std::vector<FaceEdge> horizon_;
+    std::vector<int> first_side_;  // of a vertex: the first of the sides 3 triangle + k that start there
+    std::vector<int> next_side_;   // of a side: the next that starts at the same vertex
+    std::vector<int> twin_;        // of a side: the one that runs back
+    std::vector<int> open_;        // triangles whose neighbours are to be looked at
+    std::vector<int> pieces_;      // of a plane: its triangles
 };
 
 template <class N>
 VectorOf<N> PolytopeFaces::normal(const FacePlane& plane) const {
     using Kind = FacePlane::Kind;
-    const auto at = [&](int i) { return vertex_times_denominator<N>(*exact_, i); };
+    const auto step = [&](int from, int to) { return step_times_denominator<N>(*exact_, from, to); };
     const auto axis = [&](int k) {
         return exactly<N>({k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0});
     };
     VectorOf<N> n;
     switch (plane.kind) {
         case Kind::facet:
-            n = cross(at(plane.j) - at(plane.i), at(plane.k) - at(plane.i));
+            n = cross(step(plane.i, plane.j), step(plane.i, plane.k));
             break;
         case Kind::side: {
-            const VectorOf<N> edge = at(plane.j) - at(plane.i);
-            n = cross(edge, cross(edge, at(plane.k) - at(plane.i)));
+            const VectorOf<N> edge = step(plane.i, plane.j);
+            n = cross(edge, cross(edge, step(plane.i, plane.k)));
             break;
         }
         case Kind::end:
-            n = at(plane.i) - at(plane.j);
+            n = step(plane.j, plane.i);
             break;
         case Kind::across:
-            n = cross(at(plane.j) - at(plane.i), axis(plane.k));
+            n = cross(step(plane.i, plane.j), axis(plane.k));
             break;
         case Kind::axis:
             n = axis(plane.k);

@@ -402,6 +402,11 @@ PolytopeContact PolytopeContactSolver::solve(const MovingBody& a, const MovingBo
                                              const BoxMotion& known) {
     PolytopeContact out = contact_of(known, t_max);
     const bool touches = out.status == ContactStatus::will_touch;
+    if (known.lone) {
+        lone_ = known.point;
+        out.points = {&lone_, 1};
+        return out;
+    }
     const double width = touches ? width_of(known) : 0.0;
     if (touches && !(width > 0.0)) {
         return solve(a, b, t_max, true);

@@ -56,6 +56,7 @@ private:
     MovingPair pair_;
     ContactPoints points_;
     std::vector<double> scratch_;
+    Vec3 lone_;  // the only point of contact, where it is known beforehand
 };
 
 /// As PolytopeContactSolver, without slack: numbers and points are correctly rounded, the times an ulp apart
