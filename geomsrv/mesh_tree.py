@@ -145,19 +145,22 @@ def in_order(
     limit: Callable[[], float],
     look: Callable[[IntArray, IntArray], None],
     batch: int = BATCH,
-) -> None:
+) -> float:
     """Look at pairs of pieces in the order of their keys, as long as these are not above the limit, which may fall.
 
     `keys` tells a number for nodes of both trees that is not above those of what is in them; `look` is told pieces.
+    Returns the least key of what was left out, inf if that is nothing.
     """
     leaves_a, leaves_b = len(a.piece), len(b.piece)
     i, k = np.ones(1, np.int64), np.ones(1, np.int64)
     key = np.full(1, -np.inf)
+    left_out = np.inf
     while True:
         alive = key <= limit()
+        left_out = float(key[~alive].min(initial=left_out))
         i, k, key = i[alive], k[alive], key[alive]
         if not len(i):
-            return
+            return left_out
         chosen = np.zeros(len(i), np.bool_)
         chosen[np.argpartition(key, batch)[:batch] if len(i) > batch else slice(None)] = True
         here, there = i[chosen], k[chosen]

@@ -50,6 +50,7 @@ __all__ = [
     "polygon_distances",
     "relative_poses",
     "solid_distances",
+    "unpredictable",
 ]
 
 # How much the rounded relative pose may move one body against the other, in terms of r_a + r_b + |p_ab|, r
@@ -634,7 +635,7 @@ def _spinning_polygons(
     certain = -_distance_at(world, pairs, np.zeros(len(pairs)), True)[2] >= world.uncertainty[pairs].sum(axis=1)
     certain &= tier != "bound"
     rows.upper[~apart & ~certain] = np.inf
-    return rows, _unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
+    return rows, unpredictable(world, Unsupported(pairs[apart], np.full(int(apart.sum()), NO_ROTATION, dtype=object)))
 
 
 def at_rest(world: World, pairs: IntArray, horizon: float) -> BoolArray:
@@ -672,7 +673,7 @@ def near_at_rest(
     return answered, missing
 
 
-def _unpredictable(world: World, pairs: Unsupported) -> Unsupported:
+def unpredictable(world: World, pairs: Unsupported) -> Unsupported:
     """The same pairs; where it is not known how an object moves, that is the reason."""
     if world.motion_faults:
         for k, pair in enumerate(pairs.pairs.tolist()):
@@ -721,5 +722,5 @@ def _solid_contacts(
         Unsupported.of_kinds(world, rows.pairs[part], text)
         for part, text in ((moving & ~turning, NO_MOTION), (turning, NO_TURNING))
     ]
-    unsupported = Unsupported.joined([missing, _unpredictable(world, Unsupported.joined(parts))])
+    unsupported = Unsupported.joined([missing, unpredictable(world, Unsupported.joined(parts))])
     return ContactRows.joined([answered.take(known | moving), ContactRows.silent(missing.pairs)]), unsupported

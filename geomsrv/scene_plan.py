@@ -62,7 +62,7 @@ def _first_contacts(world: World) -> list[str]:
     elif not world.turns.any():
         lines.append("- rotation: skipped, no shape has angular velocity")
     if rolling := int((sliding & spinning & ~known)[solids].sum()):
-        listed = _count(rolling, "round body or plane", "round bodies and planes")
+        listed = _count(rolling, "round body, plane or mesh", "round bodies, planes and meshes")
         lines.append(f"- followed step by step, at tier float64: {listed}")
     if lost := int((world.turns & ~spinning)[polygons].sum()):
         lines.append(f"- unsupported unless in contact now: {_count(lost, 'polygon')} that move unpredictably")
@@ -72,8 +72,6 @@ def _first_contacts(world: World) -> list[str]:
             f"- unsupported unless in contact now: {_count(strange, 'moving solid')}, "
             "against whatever moves differently"
         )
-    if (sliding & known)[solids].any() and not spinning[solids].all():
-        lines.append("- unsupported unless in contact now: boxes and hulls that move, against solids of other kinds")
     return lines
 
 

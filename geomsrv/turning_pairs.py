@@ -24,6 +24,7 @@ from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, Int
 from geomsrv.broad_phase import entry_times
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.ladder import AUTO, UNKNOWN, Quality, climb, narrow
+from geomsrv.mesh_following import follow_meshes, meshes
 from geomsrv.mesh_pairs import mesh_contacts, sliding_meshes
 from geomsrv.narrow_phase import (
     ContactRows,
@@ -34,6 +35,7 @@ from geomsrv.narrow_phase import (
     near_at_rest,
     placed_boxes,
     placed_hulls,
+    unpredictable,
 )
 from geomsrv.queries import MOVING, MOVING_POLYGONS, SOLID_MOTION_TIERS, TIERS
 from geomsrv.turning import TIME_TOLERANCE, approach, velocity_at
@@ -54,8 +56,9 @@ CAPSULE_ROUNDING = 16.0 * ROUNDOFF
 
 SWITCHED_OFF = "first contact of what turns is switched off"
 NO_APPROACH = "first contact at a distance ({}) is unsupported"
+NO_MESH = "first contact of a mesh ({}) that turns, is uncertain, or meets round bodies is available at 'float64' only"
 
-FOLLOWED = _core.shape_kinds()[:8]  #: solids that are followed, beside polygons
+FOLLOWED = _core.shape_kinds()[:9]  #: solids that are followed, beside polygons
 
 #: Solids that are followed by looks at their distance, with others and among themselves but for half spaces.
 BY_DISTANCE = ("half_space", "cylinder", "cone", "ellipsoid")
@@ -94,12 +97,16 @@ def contact_rows(
     """First contact of every pair that has one or may have one, and the pairs whose motion has no kernel."""
     if question.margin > 0.0:
         rows, unsupported = _approaches(world, pairs, question, counts)
-    elif (meshes := sliding_meshes(world, pairs, question.horizon)).any():
-        others, unsupported = contact_rows(world, pairs[~meshes], question, counts)
+    elif (sliding := sliding_meshes(world, pairs, question.horizon)).any():
+        others, unsupported = contact_rows(world, pairs[~sliding], question, counts)
         found = mesh_contacts(
-            world, pairs[meshes], question.horizon, question.tier, counts, contact_set=question.contact_set
+            world, pairs[sliding], question.horizon, question.tier, counts, contact_set=question.contact_set
         )
         return ContactRows.joined([found, others]), unsupported
+    elif (lost := meshes(world, pairs) & ~_followed(world, pairs, question)).any():
+        others, unsupported = contact_rows(world, pairs[~lost], question, counts)
+        found, missing = _held_meshes(world, pairs[lost], question, counts)
+        return ContactRows.joined([found, others]), Unsupported.joined([missing, unsupported])
     else:
         followed = _followed(world, pairs, question)
         rows, unsupported = first_contact_rows(
@@ -109,7 +116,10 @@ def contact_rows(
             count_kinds(world, pairs[followed], counts)
             if turning := int(world.turns[pairs[followed]].any(axis=1).sum()):
                 counts["rotation"] += turning
-            rows = ContactRows.joined([_turning_contacts(world, pairs[followed], question), rows])
+            stepwise = _turning_contacts(world, pairs[followed], question)
+            resting = (stepwise.time == 0.0) & at_rest(world, stepwise.pairs, question.horizon)
+            stepwise.last_time[resting] = question.horizon
+            rows = ContactRows.joined([stepwise, rows])
     if not question.contact_set:
         rows.points[:] = None
     if not question.rotation and len(unsupported.pairs):
@@ -186,14 +196,32 @@ def _settled(quality: Quality, rows: ContactRows, tier: str) -> BoolArray:
 def _followed(world: World, pairs: IntArray, question: Question) -> BoolArray:
     """(k,) bool: pairs that are followed step by step: what turns, and what is round and moves."""
     nothing = np.zeros(len(pairs), np.bool_)
-    if question.tier != "float64" or question.horizon == 0.0:
+    if question.tier != "float64":
         return nothing
     if not world.turns.any() and (world.planar | world.polyhedra).all():
         return nothing
+    surfaces = meshes(world, pairs) & ~sliding_meshes(world, pairs, question.horizon)
+    if question.horizon == 0.0:
+        return surfaces
     turns = world.turns[pairs].any(axis=1)
-    stepwise = (turns & question.rotation) | (~turns & _rolling(world, pairs))
+    stepwise = (turns & question.rotation) | (~turns & (_rolling(world, pairs) | surfaces))
     followed: BoolArray = stepwise & _followed_in_pairs(world, pairs)
     return followed
+
+
+def _held_meshes(
+    world: World, pairs: IntArray, question: Question, counts: Counter[str]
+) -> tuple[ContactRows, Unsupported]:
+    """Meshes that are not followed: in contact now, or unsupported."""
+    now, text = ContactRows.silent(pairs[:0]), NO_MESH
+    if question.tier == "float64":
+        count_kinds(world, pairs, counts)
+        now, text = _turning_contacts(world, pairs, replace(question, horizon=0.0)), SWITCHED_OFF
+        now = now.take(now.status != ContactStatus.NEVER)
+    keys = pairs @ [len(world), 1]
+    apart = pairs[~np.isin(keys, now.pairs @ [len(world), 1])]
+    missing = unpredictable(world, Unsupported.of_kinds(world, apart, text))
+    return ContactRows.joined([now, ContactRows.silent(apart)]), missing
 
 
 def _followed_in_pairs(world: World, pairs: IntArray) -> BoolArray:
@@ -266,7 +294,7 @@ def _approaches(
     followed = _followed_in_pairs(world, pairs)
     followed &= question.rotation | ~world.turns[pairs].any(axis=1)
     # Distances at rest need no looks, and the pair is near for as long as is asked.
-    followed &= ~(_by_distance(world, pairs) & at_rest(world, pairs, horizon))
+    followed &= ~(_by_distance(world, pairs) & ~meshes(world, pairs) & at_rest(world, pairs, horizon))
     count_kinds(world, pairs[followed], counts)
     rows = [_turning_contacts(world, pairs[followed], question)] if followed.any() else []
     others = pairs[~followed]
@@ -348,7 +376,13 @@ def _ask(
     count = len(pairs)
     status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
     normal, point = np.zeros((count, 3)), np.zeros((count, 3))
-    looked = _by_distance(world, pairs)
+    surfaces = meshes(world, pairs)
+    if surfaces.any():
+        answer = follow_meshes(
+            world, pairs[surfaces], question.horizon, question.tolerance, slack[surfaces], partial(_core_of, world)
+        )
+        status[surfaces], lower[surfaces], upper[surfaces], normal[surfaces], point[surfaces] = answer
+    looked = _by_distance(world, pairs) & ~surfaces
     if looked.any():
         answer = advance(world, pairs[looked], question.horizon, question.tolerance, slack[looked])
         status[looked], lower[looked], upper[looked], normal[looked], point[looked] = answer
@@ -356,7 +390,7 @@ def _ask(
     motion = np.column_stack([world.twists, world.poses[:, :3]])
     motion[world.planar, 8] = 0.0
     for flat, *is_box in product((True, False), repeat=3):
-        part = (planar == flat) & (boxes == is_box).all(axis=1) & ~looked
+        part = (planar == flat) & (boxes == is_box).all(axis=1) & ~looked & ~surfaces
         if not part.any():
             continue
         side_a, side_b = (_side(world, pairs[part, k], flat, is_box[k]) for k in range(2))
@@ -387,6 +421,11 @@ def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatA
             place, axis = world.poses[row, :3], along * world.rotations[row][:, 2]
             items.append(np.array([place - axis, place + axis])[: 2 if along else 1])
     return np.concatenate(items), np.cumsum([0, *map(len, items)], dtype=np.int64)
+
+
+def _core_of(world: World, row: int) -> tuple[FloatArray | IntArray, ...]:
+    """The same for one solid."""
+    return _side(world, np.array([row]), False, bool(world.table.boxes[world.shape[row]]))
 
 
 def _radius(world: World) -> FloatArray:

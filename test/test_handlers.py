@@ -248,11 +248,10 @@ def test_first_contact_inline_with_twists(desk) -> None:
     t = turning.time[0]
     assert 0.5 * t + math.cos(0.1 * t) == pytest.approx(3.0, abs=1e-5)
     assert 0.0 < turning.time_upper[0] - turning.time_lower[0] <= 1e-6
-    sheet = desk.ask(
-        "FirstContact",
-        **fields | {"shapes_a": shapes(SHEET), "shapes_b": shapes(gs.Sphere(1.0))},
-        twists_a=D([0.5, 0, 0, 0, 0, 0.1]),
-    )
+    fields |= {"shapes_a": shapes(SHEET), "shapes_b": shapes(gs.Sphere(1.0)), "twists_a": D([0.5, 0, 0, 0, 0, 0.1])}
+    sheet = desk.ask("FirstContact", **fields)
+    assert sheet.status == OK and sheet.item_status.tolist() == [1]
+    sheet = desk.ask("FirstContact", **fields, accuracy="exact")
     assert sheet.status == UNSUPPORTED and sheet.item_status.tolist() == [4] and math.isnan(sheet.time[0])
 
 
@@ -262,7 +261,11 @@ def test_first_contact_of_all_pairs(desk) -> None:
     assert got.status == OK and pairs == {("left", "right"): 1}, "the sheet is too far away to matter"
     desk.engine.apply(gs.SceneUpdate(add=[gs.SceneObject("sheet", SHEET, (0, 0, 1.5, 0, 0, 0, 1), (0, 0, 0, 1, 0, 0))]))
     got = desk.ask("FirstContact", select=ALL, horizon=5.0)
-    assert got.status == UNSUPPORTED and "mesh" in got.message and 4 in got.item_status
+    assert got.status == OK and "mesh" not in got.message and "sheet" in got.ids_b
+    lost = gs.SceneObject("sheet", SHEET, (0, 0, 1.5, 0, 0, 0, 1), motion_fault="it jumps")
+    desk.engine.apply(gs.SceneUpdate(add=[lost]))
+    got = desk.ask("FirstContact", select=ALL, horizon=5.0)
+    assert got.status == UNSUPPORTED and "it jumps" in got.message and 4 in got.item_status
     desk.engine.apply(gs.SceneUpdate(remove=["sheet"], add=[obj("deep", gs.Box([1, 1, 1]), (-0.5, 0, 0))]))
     now = desk.ask("FirstContact", select=ALL, horizon=5.0)
     assert now.status == OK and now.time.tolist() == sorted(now.time)

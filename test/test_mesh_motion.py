@@ -499,7 +499,7 @@ def test_scenes(rng: np.random.Generator, accuracy: str) -> None:
     answer = scene.first_contacts(horizon=20.0, accuracy=accuracy)
     rows = {frozenset(pair): k for k, pair in enumerate(zip(answer.ids_a, answer.ids_b, strict=True))}
     k = rows[frozenset(("frame", "table"))]
-    assert answer.status[k] == gs.WILL_TOUCH and answer.cost.counts["narrow box-mesh"] == 2
+    assert answer.status[k] == gs.WILL_TOUCH and answer.cost.counts["narrow box-mesh"] == 2 + (accuracy == "float64")
     assert answer.time_lower[k] <= 4.0 <= answer.time_upper[k] + PLACED
     ends = answer.part_offsets
     parts = [
@@ -517,7 +517,9 @@ def test_scenes(rng: np.random.Generator, accuracy: str) -> None:
         assert answer.time[both] == pytest.approx(6.0, abs=PLACED) and answer.status[both] == gs.WILL_TOUCH
         assert frozenset(("frame", "wedge")) in rows
     reasons = {frozenset((a, b)): reason for a, b, reason in answer.unsupported}
-    assert frozenset(("spinning", "table")) in reasons and frozenset(("ball", "frame")) in reasons
+    # What is followed step by step is followed at one tier.
+    for pair in (frozenset(("spinning", "table")), frozenset(("ball", "frame"))):
+        assert (pair in reasons) == (accuracy != "float64")
     # Together or apart, in whatever order.
     once = scene.first_contacts(horizon=20.0, accuracy=accuracy, earliest=True)
     assert len(once.status) - (once.status == ContactStatus.UNSUPPORTED).sum() == 1

@@ -346,9 +346,12 @@ def test_pairs_without_a_kernel_are_named():
     assert answer.cost.counts["unsupported"] == 3
     assert "2 x distance mesh-sphere is unsupported" in answer.message
     assert "cylinder-mesh" in scene.plan() and "half_space-mesh" in scene.plan() and "mesh-mesh" not in scene.plan()
-    # For first contact such pairs have a row: never dropped.
+    # First contact looks at triangles, and needs no distances; at other tiers such pairs have a row: never dropped.
     contacts = scene.first_contacts(1.0)
-    assert contacts.unsupported == answer.unsupported
+    assert contacts.unsupported == []
+    assert contacts.status[rows_of(contacts)["a sheet", "d ball"]] == ContactStatus.OVERLAPPING
+    contacts = scene.first_contacts(1.0, accuracy="exact")
+    assert [pair[:2] for pair in contacts.unsupported] == [pair[:2] for pair in answer.unsupported]
     assert contacts.status[rows_of(contacts)["a sheet", "d ball"]] == ContactStatus.UNSUPPORTED
 
 
@@ -487,11 +490,11 @@ def test_solids_that_turn():
         9.0
     )
     assert np.linalg.norm(ball.points[0] - [0.0, 1.5, 0.0]) == pytest.approx(0.5, abs=1e-5)
-    # Out of reach for ever, and what no kernel follows.
+    # Out of reach for ever, and a surface.
     far = scene_of([spinning("bar", bar), gs.SceneObject("ball", gs.Sphere(0.5), at(0.0, 3.0, 0.0))])
     assert len(far.first_contacts(INF)) == 0
     sheet = scene_of([spinning("bar", bar), gs.SceneObject("sheet", SHEET, at(0.0, 1.5, 0.0))])
-    assert sheet.first_contacts(10.0).status.tolist() == [ContactStatus.UNSUPPORTED]
+    assert sheet.first_contacts(10.0).status.tolist() == [ContactStatus.WILL_TOUCH]
     # Turning alike is not being at rest relative to each other: each turns about its own origin.
     for away, statuses in ((0.3, []), (1.5, [ContactStatus.WILL_TOUCH]), (5.0, [])):
         alike = scene_of([spinning("a", bar), spinning("b", bar, at(0.0, away, 0.0), spin=(0.0, 0.0, 1.0))])
@@ -1285,7 +1288,7 @@ def test_plan_says_what_is_computed_and_what_is_not():
     assert "nothing moves, nothing is swept" in scene.plan() and "unsupported" not in scene.plan()
     scene.set_states(["a"], [IDENTITY], [(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)])
     assert "boxes swept for 1 moving object" in scene.plan()
-    assert "followed step by step, at tier float64: 1 round body or plane" in scene.plan()
+    assert "followed step by step, at tier float64: 1 round body, plane or mesh" in scene.plan()
     assert "2 solids (sphere 2)" in scene.plan()
     push = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     boxes = [gs.SceneObject(name, gs.Box((1.0, 1.0, 1.0)), at(5.0 * k, 0.0, 0.0), push) for k, name in enumerate("xyz")]
@@ -1294,4 +1297,4 @@ def test_plan_says_what_is_computed_and_what_is_not():
     scene.apply(gs.SceneUpdate(add=[gs.SceneObject("floor", gs.HalfSpace((0.0, 0.0, 1.0), -9.0))]))
     assert "unsupported" not in scene.plan()
     scene.apply(gs.SceneUpdate(add=[gs.SceneObject("sheet", SHEET, at(0.0, 0.0, 50.0))]))
-    assert "unsupported unless in contact now: boxes and hulls that move, against solids of other kinds" in scene.plan()
+    assert "unsupported unless in contact now" not in scene.plan() and "no kernel: box-mesh" in scene.plan()

@@ -119,7 +119,9 @@ def test_margin_without_motion():
     answer = scene_of([floor, falling]).first_contacts(2.0, margin=0.5)
     assert answer.time_lower[0] <= 1.0 <= answer.time_upper[0] <= answer.time_lower[0] + 1e-6
     sheet = gs.SceneObject("sheet", gs.Mesh(np.eye(3), [(0, 1, 2)]), [0, 0, 2.0, 0, 0, 0, 1])
-    answer = scene_of([sheet, falling]).first_contacts(1.0, margin=0.5)
+    assert scene_of([sheet, falling]).first_contacts(1.0, margin=0.5).status.tolist() == [ContactStatus.OVERLAPPING]
+    lost = gs.SceneObject("ball", gs.Sphere(0.5), [0, 0, 2.0, 0, 0, 0, 1], motion_fault="it jumps")
+    answer = scene_of([sheet, lost]).first_contacts(1.0, margin=0.5)
     assert answer.unsupported == [("ball", "sheet", "first contact at a distance (mesh-sphere) is unsupported")]
 
 
@@ -183,7 +185,7 @@ def test_earliest_of_equals_is_the_first_by_id():
 
 def test_earliest_keeps_what_is_unsupported():
     sheet = gs.Mesh([(-1, -1, 0), (1, -1, 0), (0, 1, 0)], [(0, 1, 2)])
-    flying = gs.SceneObject("flying", sheet, [0, 0, 3.0, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0.5])
+    flying = gs.SceneObject("flying", sheet, [0, 0, 3.0, 0, 0, 0, 1], motion_fault="it jumps")
     cubes = [
         gs.SceneObject(name, gs.Box([0.5, 0.5, 0.5]), [0, 0, z, 0, 0, 0, 1], [0, 0, v, 0, 0, 0])
         for name, z, v in (("low", 0.0, 0.0), ("up", 9.0, -4.0))

@@ -1,0 +1,260 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""First contact of listed pairs of objects of which one is a mesh that turns, is uncertain, or has a margin.
+
+The mesh is the union of its triangles, and each of them is followed as a hull of three points.  Boxes around halves of
+halves of the triangles turn with the mesh and are followed, too: what meets later than a proven contact is not looked
+into.  Whatever a pair may be off by counts for every box and triangle, so the least of their bounds are those of the
+whole: apart until the least `lower`, in contact by the least `upper`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geomsrv import _core
+from geomsrv.advancement import advance
+from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
+from geomsrv.mesh import NODE_ROUNDING, SMALLEST, TURNING_BATCH
+from geomsrv.mesh_tree import Tree, in_order
+from geomsrv.narrow_phase import RELATIVE_POSE_ROUNDING, placed
+from geomsrv.shapes import Mesh, PackedShapes
+from geomsrv.world import ShapeTable, World
+
+# Pieces that meet earlier than others by no more than this share of the tolerance need not be told from them.
+SAME_TIME = 0.25
+
+# Pairs of pieces that are followed for the sake of the latest possible contact, where that is far from the earliest.
+MOST_PIECES = 256
+
+__all__ = ["Answer", "follow_meshes", "meshes"]
+
+Answer = tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]  #: status, lower, upper, normal, point
+_Row = tuple[int, float, float, FloatArray, FloatArray]  #: that of one pair
+_Bodies = tuple[FloatArray | IntArray, ...]
+
+SPHERE, CAPSULE, BOX, CONVEX, HALF_SPACE, *_ = range(len(_core.shape_kinds()))
+
+
+def meshes(world: World, pairs: IntArray) -> BoolArray:
+    """(k,) bool: pairs of which one is a mesh."""
+    if Mesh.kind not in world.table.kind_names:
+        return np.zeros(len(pairs), np.bool_)
+    found: BoolArray = (world.kinds == _core.shape_kinds().index(Mesh.kind))[pairs].any(axis=1)
+    return found
+
+
+def follow_meshes(
+    world: World,
+    pairs: IntArray,
+    horizon: float,
+    tolerance: float,
+    slack: FloatArray,
+    core: Callable[[int], _Bodies],
+) -> Answer:
+    """Status, lower, upper, normal and point of pairs, as of the engine's kernel for bodies that turn.
+
+    Parameters
+    ----------
+    slack : (k, 3) float
+        Margin [m] up to which bodies are in contact, uncertainty [m], and drift [m/s]: the answer holds for all bodies
+        within.
+    core : callable
+        The box, hull, or core of a round body in a row of the world, as the engine reads it.
+    """
+    rows = []
+    sides: dict[int, _Side] = {}
+    for pair, room in zip(pairs.tolist(), slack, strict=True):
+        for row in pair:
+            if row not in sides:
+                sides[row] = _Side(world, row, core)
+        a, b = (sides[row] for row in pair)
+        rows.append(_first(_Question(world, a, b, horizon, tolerance, room[None])))
+    status, lower, upper = (np.array([row[k] for row in rows]) for k in range(3))
+    normal, point = (np.array([row[k] for row in rows]).reshape(-1, 3) for k in (3, 4))
+    return status.astype(np.uint8), lower, upper, normal, point
+
+
+class _Side:
+    """An object: its boxes and its pieces, as the engine reads them, one for all where it is no mesh."""
+
+    def __init__(self, world: World, row: int, core: Callable[[int], _Bodies]) -> None:
+        table, shape = world.table, int(world.shape[row])
+        self.row, self.kind = row, int(world.kinds[row])
+        self.motion = np.concatenate([world.twists[row], world.poses[row, :3]])[None]
+        self.axes = np.ascontiguousarray(world.rotations_of(np.array([row])).swapaxes(1, 2))
+        self._placed = partial(_placed, world, row)
+        size = float(np.abs(world.poses[row, :3]).sum()) + float(table.reach[shape])
+        self._grown = RELATIVE_POSE_ROUNDING * size + SMALLEST
+        body = table.shapes[shape]
+        self.mesh = body if isinstance(body, Mesh) else None
+        if isinstance(body, Mesh):
+            self.tree = body.tree
+            self._vertices = self._placed(body.vertices)
+            return
+        self.tree = Tree(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1, np.int64))
+        self.curved = self.kind > HALF_SPACE
+        if self.curved or self.kind == HALF_SPACE:
+            half = table.half[shape][None] * (1.0 + NODE_ROUNDING) + self._grown
+            self._body: _Bodies = (world.poses[row, :3][None].copy(), self.axes, half)
+        else:
+            self._body = core(row)
+
+    def nodes(self, rows: IntArray) -> _Bodies:
+        """Boxes that hold what is in nodes of the tree; they turn with it."""
+        if self.mesh is None:
+            return self._body
+        low, high = self.tree.low[rows], self.tree.high[rows]
+        center = 0.5 * low + 0.5 * high
+        half = np.maximum(high - center, center - low) * (1.0 + NODE_ROUNDING) + self._grown
+        axes = np.ascontiguousarray(np.broadcast_to(self.axes, (len(rows), 3, 3)))
+        return self._placed(center), axes, half
+
+    def pieces(self, rows: IntArray) -> _Bodies:
+        """Triangles, in the fixed frame."""
+        if self.mesh is None:
+            return self._body
+        corners = self._vertices[self.mesh.triangles[rows]].reshape(-1, 3)
+        return corners, np.arange(0, len(corners) + 1, 3)
+
+    def corners(self, rows: IntArray) -> FloatArray:
+        """(k, 3, 3) of triangles of a mesh, in its own frame."""
+        assert self.mesh is not None
+        return self.mesh.vertices[self.mesh.triangles[rows]]
+
+
+def _placed(world: World, row: int, points: FloatArray) -> FloatArray:
+    return placed(world, np.full(len(points), row), points)
+
+
+class _Question(NamedTuple):
+    """What is asked about one pair."""
+
+    world: World
+    a: _Side
+    b: _Side
+    end: float  #: of the time window
+    tolerance: float
+    slack: FloatArray  #: (1, 3)
+
+    def engine(self, body_a: _Bodies, body_b: _Bodies, end: float) -> Answer:
+        """Boxes, or hulls, against such."""
+        return self._asked(body_a, body_b, end, self.slack)
+
+    def earliest(self, nodes_a: IntArray, nodes_b: IntArray, end: float) -> FloatArray:
+        """(k,) until when boxes are surely apart; inf if to the end."""
+        # Nobody asks when these are surely in contact: it is as well to take what they may be off by for a margin.
+        margin, doubt, drift = self.slack[0]
+        near = np.array([[np.nextafter(margin + doubt, np.inf), 0.0, drift]])
+        status, lower, *_ = self._asked(self.a.nodes(nodes_a), self.b.nodes(nodes_b), end, near)
+        return np.where(status == ContactStatus.NEVER, np.inf, np.fmax(lower, 0.0))
+
+    def _asked(self, body_a: _Bodies, body_b: _Bodies, end: float, slack: FloatArray) -> Answer:
+        found: Any = _core.first_contact_turning(
+            body_a, body_b, self.a.motion, self.b.motion, end, self.tolerance, slack
+        )
+        return found[:5]  # type: ignore[no-any-return]
+
+    def by_distance(self, hulls: FloatArray, end: float) -> Answer:
+        """Hulls (k, m, 3) of points of the mesh, in its own frame, against the curved body or half space."""
+        mesh_first = self.a.mesh is not None
+        mesh, other = (self.a, self.b) if mesh_first else (self.b, self.a)
+        count = len(hulls)
+        world = _of_hulls(self.world, mesh.row, hulls, other.row)
+        pairs = np.column_stack([np.arange(count), np.full(count, count)])
+        slack = np.repeat(self.slack, count, axis=0)
+        return advance(world, pairs if mesh_first else pairs[:, ::-1], end, self.tolerance, slack)
+
+
+def _of_hulls(world: World, row: int, hulls: FloatArray, other: int) -> World:
+    """Hulls (k, m, 3) that move like one object, and after them another object that has no vertices."""
+    table, count = world.table, len(hulls)
+    shape = world.shape[other]
+    packed = PackedShapes(
+        np.append(np.full(count, CONVEX, np.uint8), table.packed.kinds[shape]),
+        np.concatenate([np.zeros((count, 4)), table.packed.params[shape][None]]),
+        np.ascontiguousarray(hulls.reshape(-1, 3)),
+        np.append(np.arange(count + 1), count) * hulls.shape[1],
+    )
+    reach = np.append(np.linalg.norm(hulls, axis=2).max(axis=1), table.reach[shape])
+    rows = np.append(np.full(count, row), other)
+    return replace(
+        World.empty(),
+        table=replace(ShapeTable.of(()), packed=packed, reach=reach),
+        shape=np.arange(count + 1),
+        poses=world.poses[rows],
+        twists=world.twists[rows],
+    )
+
+
+def _first(q: _Question) -> _Row:
+    """Answer for one pair."""
+    found: list[Answer] = []
+    other = q.b if q.a.mesh is not None else q.a
+    if other.mesh is None and other.kind == HALF_SPACE:
+        # What is not in a half space is convex: the hull of a mesh meets it when the mesh does.
+        mesh = q.a.mesh or q.b.mesh
+        assert mesh is not None
+        found.append(q.by_distance(mesh.vertices[np.unique(mesh.triangles)][None], q.end))
+        return _whole(found, q.tolerance, np.inf)
+    curved = other.mesh is None and other.curved
+    low, high, deep, looked = np.inf, np.inf, False, 0
+
+    def limit() -> float:
+        if deep:
+            return -np.inf
+        latest = min(high - SAME_TIME * q.tolerance, q.end)
+        return latest if looked < MOST_PIECES else min(low - SAME_TIME * q.tolerance, latest)
+
+    def begin(nodes_a: IntArray, nodes_b: IntArray) -> FloatArray:
+        if not len(nodes_a):
+            return np.zeros(0)
+        return q.earliest(nodes_a, nodes_b, min(high, q.end))
+
+    def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
+        nonlocal low, high, deep, looked
+        # What meets later than a proven contact need not be followed.
+        end = min(high, q.end)
+        if curved:
+            mesh, pieces = (q.a, pieces_a) if q.a.mesh is not None else (q.b, pieces_b)
+            answer = q.by_distance(mesh.corners(pieces), end)
+        else:
+            answer = q.engine(q.a.pieces(pieces_a), q.b.pieces(pieces_b), end)
+        found.append(answer)
+        met = answer[0] != ContactStatus.NEVER
+        low = float(np.fmax(answer[1], 0.0)[met].min(initial=low))
+        high = float(np.fmin.reduce(answer[2], initial=high))
+        deep = deep or bool((answer[0] == ContactStatus.OVERLAPPING).any())
+        looked += len(pieces_a)
+
+    left_out = in_order(q.a.tree, q.b.tree, begin, limit, look, TURNING_BATCH)
+    return _whole(found, q.tolerance, left_out)
+
+
+def _whole(found: list[Answer], tolerance: float, left_out: float) -> _Row:
+    """What the answers for pairs of pieces say of the whole, others being left out that meet at some time or later.
+
+    Status and place are those of the first.
+    """
+    nowhere = np.full(3, np.nan)
+    if not found:
+        return ContactStatus.NEVER, np.nan, np.nan, nowhere, nowhere
+    status, lower, upper, normal, point = (np.concatenate(column) for column in zip(*found, strict=True))
+    met = status != ContactStatus.NEVER
+    if not met.any():
+        return ContactStatus.NEVER, np.nan, np.nan, nowhere, nowhere
+    now = [s for s in (ContactStatus.OVERLAPPING, ContactStatus.TOUCHING) if (status == s).any()]
+    if now:
+        met = status == now[0]
+    first = int(np.argmin(np.where(met, np.fmax(lower, 0.0), np.inf)))
+    low, high = max(min(float(np.fmax(lower[first], 0.0)), left_out), 0.0), float(np.fmin.reduce(upper))
+    how = int(status[first])
+    vague = how in (ContactStatus.GRAZING, ContactStatus.NOT_CONVERGED)
+    if vague and high - low <= tolerance:
+        how = ContactStatus.WILL_TOUCH
+    return how, low, high, normal[first], point[first]
