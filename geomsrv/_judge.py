@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,6 +173,7 @@ class Rows:
     point_b: FloatArray
     normal: FloatArray
     unsupported: NDArray[np.bool_]
+    prefix: ClassVar[str] = ""  #: of their kinds in a tally
 
     def __len__(self) -> int:
         return len(self.shapes)

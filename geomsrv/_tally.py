@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from geomsrv._judge import AnyShape, Blame
 from geomsrv.shapes import pack
 
-__all__ = ["Difference", "KindTally", "Mode", "SkipReason", "Tally"]
+__all__ = ["Difference", "KindTally", "Mode", "MotionDifference", "SkipReason", "Tally"]
 
 FloatArray = NDArray[np.float64]
 
@@ -105,6 +105,64 @@ class Difference:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class MotionDifference:
+    """One pair in translation on whose first contact FCL and the engine differ.
+
+    Attributes
+    ----------
+    pose_a, pose_b : (7,) float64
+    velocity_a, velocity_b : (3,) float64
+        [m/s]
+    end : float
+        How far FCL looked [s].
+    time : float
+        Our answer [s]; NaN: never.
+    fcl_time : float
+        [s]; NaN: never.
+    """
+
+    kind: str
+    label: str
+    shape_a: AnyShape
+    shape_b: AnyShape
+    pose_a: FloatArray
+    pose_b: FloatArray
+    velocity_a: FloatArray
+    velocity_b: FloatArray
+    end: float
+    time: float
+    fcl_time: float
+    blame: Blame
+    reason: str
+    question: str = "first contact"
+
+    @property
+    def explained(self) -> bool:
+        """Whether FCL is shown to be wrong."""
+        return self.blame == Blame.FCL
+
+    def reproducer(self) -> str:
+        """Python expression that repeats the query, as of `Difference`.
+
+        It needs ``from geomsrv.motion_check import first_contact_of_two``, too.
+        """
+        sides = (
+            (self.shape_a, self.pose_a, self.velocity_a),
+            (self.shape_b, self.pose_b, self.velocity_b),
+        )
+        listed = ", ".join(f"{_expression(shape)}, {_hex(pose)}, {_hex(velocity)}" for shape, pose, velocity in sides)
+        return f"first_contact_of_two({listed}, {_hex(self.end)})"
+
+    def __str__(self) -> str:
+        """One line for logs."""
+        ours, theirs = ("never" if np.isnan(t) else f"{t:.9g} s" for t in (self.time, self.fcl_time))
+        return (
+            f"{self.kind}{f' ({self.label})' if self.label else ''}: {self.question} differs, here {ours}, "
+            f"fcl {theirs}; {_WORDS[self.blame]}: {self.reason}"
+        )
+
+
 _WORDS = {Blame.FCL: "explained", Blame.ENGINE: "THE ENGINE IS WRONG", Blame.NOBODY: "UNEXPLAINED"}
 
 
@@ -166,14 +224,14 @@ class Tally:
     pending : int
         Pairs without a verdict yet.
     kinds : dict of str to KindTally
-        Verdicts by pair kind, "box-sphere".
+        Verdicts by pair kind, "box-sphere"; on first contacts, "motion box-sphere".
     reasons : dict of SkipReason to int
         Skipped pairs by reason.
     restarts : int
         How often the worker was started again after it died or hung.
     last_loss : str
         How the worker was lost last, with the end of what it wrote to stderr; empty if it never was.
-    recent : tuple of Difference
+    recent : tuple of Difference or MotionDifference
         The last explained and the last unexplained differences; unexplained ones come last.
     """
 
@@ -187,7 +245,7 @@ class Tally:
     reasons: dict[SkipReason, int] = field(default_factory=dict)
     restarts: int = 0
     last_loss: str = ""
-    recent: tuple[Difference, ...] = ()
+    recent: tuple[Difference | MotionDifference, ...] = ()
 
     @property
     def agreed(self) -> int:

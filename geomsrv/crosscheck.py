@@ -1,6 +1,6 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cross-check: re-run distance and intersection through FCL beside the engine, and count where they differ.
+"""Cross-check: re-run distance, intersection and first contact through FCL beside the engine, count where they differ.
 
 `CrossCheck.submit` copies a few rows and returns.  A thread hands them to a worker process and judges what comes
 back (`geomsrv._judge`).  When FCL aborts, hangs or segfaults, the worker is replaced: that costs one pair,
@@ -39,16 +39,17 @@ from geomsrv._judge import (
     pair_kind,
     scales,
 )
-from geomsrv._tally import Difference, KindTally, Mode, SkipReason, Tally
+from geomsrv._tally import Difference, KindTally, Mode, MotionDifference, SkipReason, Tally
 from geomsrv._witness import Bracket, Placed, bracket
 from geomsrv.answers import Distances, DistanceStatus
 from geomsrv.errors import GeometryError, NotAvailableError
+from geomsrv.motion_check import MotionRows, judged
 from geomsrv.queries import distance
 from geomsrv.shapes import CURVED
 
 if TYPE_CHECKING:
-    from geomsrv.pairwise import ListedDistances
-    from geomsrv.scene import PairDistances, Scene
+    from geomsrv.pairwise import ListedContacts, ListedDistances
+    from geomsrv.scene import PairContacts, PairDistances, Scene
     from geomsrv.world import World
 
 __all__ = ["Blame", "CrossCheck", "Difference", "KindTally", "Mode", "SkipReason", "Tally", "cross_check_scene"]
@@ -73,6 +74,13 @@ _NO_VERDICT = {
     int(NoReply.BACKING_OFF): SkipReason.BACKING_OFF,
     int(NoReply.UNAVAILABLE): SkipReason.UNAVAILABLE,
     int(NoReply.STOPPED): SkipReason.CLOSED,
+}
+
+#: Who is wrong about a first contact, and what shows it.
+_WHY_MOTION = {
+    "fcl_missed": (Blame.FCL, "bodies are proven to be apart just before our time, and to overlap just after it"),
+    "fcl_off": (Blame.FCL, "bodies are proven to be where we say, and not where FCL says"),
+    "engine_wrong": (Blame.ENGINE, "bodies are proven not to meet when we say"),
 }
 
 _log = logging.getLogger(__name__)
@@ -138,12 +146,14 @@ class CrossCheck:
 
         # Guards all that follow; notified when work arrives, when it is done, and on closing.
         self._changed = threading.Condition()
-        self._queue: deque[Rows] = deque()
+        self._queue: deque[Rows | MotionRows] = deque()
         self._offered = self._not_sampled = self._pending = 0
         self._kinds: dict[str, KindTally] = {}
         self._reasons: Counter[SkipReason] = Counter()
-        self._unpolled: deque[Difference] = deque(maxlen=MAX_UNPOLLED)
-        self._recent = {explained: deque[Difference](maxlen=MAX_RECENT) for explained in (True, False)}
+        self._unpolled: deque[Difference | MotionDifference] = deque(maxlen=MAX_UNPOLLED)
+        self._recent = {
+            explained: deque[Difference | MotionDifference](maxlen=MAX_RECENT) for explained in (True, False)
+        }
         self._closing = False
         self._thread: threading.Thread | None = None
         self._retired = False  # the thread has ended, or is past looking at the queue
@@ -303,7 +313,44 @@ class CrossCheck:
         rows = [(world.index[a], world.index[b]) for a, b in zip(answer.ids_a, answer.ids_b, strict=True)]
         return self.submit_pairs(world, np.array(rows, np.int64).reshape(-1, 2), answer)
 
-    def poll(self) -> list[Difference]:
+    def submit_motion(
+        self, world: World, pairs: IntArray, answer: PairContacts | ListedContacts, horizon: float
+    ) -> int:
+        """Queue first contacts of pairs of a scene's version that move relative to each other; returns at once.
+
+        Pairs that turn, or of kinds whose motion FCL is not asked about, count as skipped.  Kinds in the tally begin
+        with "motion ".
+
+        Parameters
+        ----------
+        world : World
+        pairs : (n, 2) int64
+            Rows of `world`.
+        answer : PairContacts or ListedContacts
+            n rows, of contacts without a margin.
+        horizon : float
+            [s]
+
+        Returns
+        -------
+        int
+            How many pairs were queued; in mode "off", and at tiers that are not `COMPARED`, always 0.
+        """
+        if self.mode == Mode.OFF or answer.cost.accuracy not in COMPARED or not len(pairs):
+            return 0
+        rows = MotionRows.of(world, pairs, answer.status, answer.time, horizon)
+        followed = rows.followed()
+        if len(foreign := rows.take(np.flatnonzero(~followed))):
+            with self._changed:
+                self._offered += len(foreign)
+                self._skip(foreign.shapes, SkipReason.UNSUPPORTED_BY_FCL, rows.prefix)
+        rows = rows.take(np.flatnonzero(followed))
+        rows = rows.take(self._admit(rows.shapes, rows.prefix))
+        if len(rows):
+            self._enqueue(rows)
+        return len(rows)
+
+    def poll(self) -> list[Difference | MotionDifference]:
         """Differences found since the last call, the last `MAX_UNPOLLED` of them; never waits."""
         with self._changed:
             found = list(self._unpolled)
@@ -355,7 +402,7 @@ class CrossCheck:
 
     # --------------------------------------------------------------------------------------- taking pairs in
 
-    def _admit(self, shapes: list[tuple[AnyShape, AnyShape]]) -> list[int]:
+    def _admit(self, shapes: list[tuple[AnyShape, AnyShape]], prefix: str = "") -> list[int]:
         """Count what is offered and pick, in ascending order, what is to be queued."""
         with self._changed:
             self._offered += len(shapes)
@@ -373,12 +420,12 @@ class CrossCheck:
                 order = self._random.permutation(chosen)
                 chosen, left, reason = np.sort(order[:room]), order[room:], SkipReason.DROPPED
             if len(left):
-                self._skip([shapes[i] for i in left.tolist()], reason)
+                self._skip([shapes[i] for i in left.tolist()], reason, prefix)
             self._pending += len(chosen)
             taken: list[int] = chosen.tolist()
         return taken
 
-    def _enqueue(self, rows: Rows) -> None:
+    def _enqueue(self, rows: Rows | MotionRows) -> None:
         """Queue rows that have been admitted."""
         with self._changed:
             for start in range(0, len(rows), BATCH_PAIRS):
@@ -396,13 +443,14 @@ class CrossCheck:
     def _give_up(self) -> None:
         """Skip all that is queued, since nobody will judge it; the lock is held."""
         while self._queue:
-            self._skip(self._queue[0].shapes, SkipReason.CLOSED if self._closing else SkipReason.UNAVAILABLE)
-            self._done(self._queue[0])
+            batch, reason = self._queue[0], SkipReason.CLOSED if self._closing else SkipReason.UNAVAILABLE
+            self._skip(batch.shapes, reason, batch.prefix)
+            self._done(batch)
 
-    def _skip(self, shapes: Sequence[tuple[AnyShape, AnyShape]], reason: SkipReason) -> None:
+    def _skip(self, shapes: Sequence[tuple[AnyShape, AnyShape]], reason: SkipReason, prefix: str = "") -> None:
         """Count pairs that get no verdict; the lock is held."""
         for (kind_a, kind_b), count in Counter((a.kind, b.kind) for a, b in shapes).items():
-            self._of_kind(pair_kind(kind_a, kind_b)).skipped += count
+            self._of_kind(prefix + pair_kind(kind_a, kind_b)).skipped += count
             self._reasons[reason] += count
 
     def _of_kind(self, kind: str) -> KindTally:
@@ -414,9 +462,12 @@ class CrossCheck:
         """Judge batch after batch until closed."""
         try:
             while batch := self._next():
-                findings = self._judge(batch, fcl)
+                if isinstance(batch, MotionRows):
+                    findings = self._judge_motion(batch, fcl)
+                else:
+                    findings = self._judge(batch, fcl)
                 with self._changed:
-                    self._book(findings)
+                    self._book(findings, batch.prefix)
                     self._done(batch)
         except Exception as error:
             # A fault in here must not reach the caller, and must not pass unnoticed.
@@ -428,26 +479,26 @@ class CrossCheck:
                 self._retired = True
                 self._give_up()
 
-    def _next(self) -> Rows | None:
+    def _next(self) -> Rows | MotionRows | None:
         """The batch at the head of the queue, where it stays until it is done; None when closing."""
         with self._changed:
             self._changed.wait_for(lambda: self._queue or self._closing)
             return None if self._closing else self._queue[0]
 
-    def _done(self, batch: Rows) -> None:
+    def _done(self, batch: Rows | MotionRows) -> None:
         """Take the batch off the queue; the lock is held."""
         self._queue.popleft()
         self._pending -= len(batch)
         self._changed.notify_all()
 
-    def _book(self, findings: _Findings) -> None:
+    def _book(self, findings: _Findings, prefix: str) -> None:
         """Add to the counters; the lock is held."""
         for kind, count in findings.agreed.items():
-            self._of_kind(kind).agreed += count
+            self._of_kind(prefix + kind).agreed += count
         for reason, shapes in findings.skipped.items():
-            self._skip(shapes, reason)
+            self._skip(shapes, reason, prefix)
         for difference in findings.differences:
-            tally = self._of_kind(difference.kind)
+            tally = self._of_kind(prefix + difference.kind)
             if difference.explained:
                 tally.explained += 1
             else:
@@ -498,6 +549,44 @@ class CrossCheck:
                 for i in differs
             ],
         )
+        return findings
+
+    def _judge_motion(self, batch: MotionRows, fcl: FclSupervisor) -> _Findings:
+        """Ask FCL when bodies meet, and put our answer to the proof where it differs."""
+        findings = _Findings()
+        solids = [(self._solid(a), self._solid(b)) for a, b in batch.shapes]
+        found = judged(fcl, batch, solids)
+        outcomes = np.array([one.outcome for one in found])
+        for outcome, reason in _NO_VERDICT.items():
+            findings.skip(batch, outcomes == outcome, reason)
+        findings.skip(batch, np.array([one.verdict == "too_close" for one in found]), SkipReason.TOO_CLOSE)
+        world = batch.world
+        for one, (i, j), (a, b), end, time in zip(
+            found, batch.pairs.tolist(), batch.shapes, batch.end.tolist(), batch.time.tolist(), strict=True
+        ):
+            kind = pair_kind(a.kind, b.kind)
+            if one.verdict == "agreed":
+                findings.agreed[kind] += 1
+            elif one.verdict in _WHY_MOTION:
+                blame, why = _WHY_MOTION[one.verdict]
+                hit = one.outcome == fcl_worker.Outcome.CONTACT
+                findings.differences.append(
+                    MotionDifference(
+                        kind=kind,
+                        label=f"{world.ids[i]} / {world.ids[j]}",
+                        shape_a=a,
+                        shape_b=b,
+                        pose_a=world.poses[i],
+                        pose_b=world.poses[j],
+                        velocity_a=world.twists[i, :3],
+                        velocity_b=world.twists[j, :3],
+                        end=end,
+                        time=time,
+                        fcl_time=one.share * end if hit else np.nan,
+                        blame=blame,
+                        reason=why,
+                    )
+                )
         return findings
 
     def _look_closer(
@@ -603,12 +692,13 @@ class _Findings:
 
     agreed: Counter[str] = field(default_factory=Counter)
     skipped: dict[SkipReason, list[tuple[AnyShape, AnyShape]]] = field(default_factory=dict)
-    differences: list[Difference] = field(default_factory=list)
+    differences: list[Difference | MotionDifference] = field(default_factory=list)
 
-    def skip(self, rows: Rows, which: NDArray[np.bool_], reason: SkipReason) -> None:
+    def skip(self, rows: Rows | MotionRows, which: NDArray[np.bool_], reason: SkipReason) -> None:
         """Note that those rows get no verdict."""
         if which.any():
-            self.skipped.setdefault(reason, []).extend(rows.shapes[i] for i in np.flatnonzero(which))
+            shapes = rows.shapes
+            self.skipped.setdefault(reason, []).extend(shapes[i] for i in np.flatnonzero(which))
 
 
 def _relative_rotations(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -98,6 +98,10 @@ def _no_turning(now: Situation) -> str:
     )
 
 
+def _no_second_opinion(now: Situation) -> str:
+    return now.cross_check
+
+
 # Top to bottom, as they run; needs point up.
 EFFECTS = (
     Effect("cull", "what the camera sees", (VISIBLE,), absent=_no_camera),
@@ -108,7 +112,15 @@ EFFECTS = (
     Effect("rotation", "first contact of what turns", (CONTACTS, MARKERS), ("first_contact",), _no_turning),
     Effect("contact_set", "the points of contact", (CONTACTS, MARKERS), ("contact",)),
     Effect("penetration", "how deep overlapping pairs are", (CONTACTS, DISTANCES, MARKERS)),
-    Effect("cross_check", "a second opinion by FCL", (DISTANCES,), ("distance",), lambda now: now.cross_check),
+    Effect("cross_check", "a second opinion by FCL on distances", (DISTANCES,), ("distance",), _no_second_opinion),
+    Effect(
+        "motion_check",
+        "a second opinion by FCL on first contacts",
+        (CONTACTS, MARKERS),
+        ("first_contact",),
+        _no_second_opinion,
+        optional=False,
+    ),
     Effect("markers", "a drawing", (MARKERS,)),
 )
 

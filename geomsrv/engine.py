@@ -22,7 +22,7 @@ from geomsrv.answers import Cost
 from geomsrv.config import Config
 from geomsrv.crosscheck import CrossCheck
 from geomsrv.effects import CONTACTS, DISTANCES, OFF, ON, VISIBLE, Situation, Stage, plan
-from geomsrv.pairwise import ListedDistances
+from geomsrv.pairwise import ListedContacts, ListedDistances
 from geomsrv.scene import PairContacts, PairDistances, Scene, SceneCull, SceneUpdate
 from geomsrv.shapes import Frustum
 from geomsrv.turning_pairs import followed_in_turning
@@ -250,6 +250,8 @@ class Engine:
             self.counters["penetration"] += 1
             depth = _depths(pairs, self.scene.contacts(accuracy=self.config.accuracy))
         self.totals.add("~/contacts", pairs.cost, len(pairs))
+        if "motion_check" in on and margin == 0.0:
+            self.check_scene_motion(pairs, horizon)
         counts = pairs.cost.counts
         return SceneContacts(pairs, depth, horizon, margin, counts.get("pairs", 0) - counts.get("allowed", 0))
 
@@ -258,6 +260,21 @@ class Engine:
         if self.cross_check.mode != "off":
             self.counters["cross_check"] += 1
             self.cross_check.submit_pairs(world, pairs, answer)
+
+    def check_motion(
+        self, world: World, pairs: IntArray, answer: PairContacts | ListedContacts, horizon: float
+    ) -> None:
+        """Hand first contacts, without a margin, of (n, 2) rows of `world` to the cross-check, if it is on."""
+        if self.cross_check.mode != "off":
+            self.counters["motion_check"] += 1
+            self.cross_check.submit_motion(world, pairs, answer, horizon)
+
+    def check_scene_motion(self, answer: PairContacts, horizon: float) -> None:
+        """The same of an answer of the scene, unless that has changed since."""
+        world = self.scene.world
+        if self.cross_check.mode != "off" and world.version == answer.version:
+            rows = [(world.index[a], world.index[b]) for a, b in zip(answer.ids_a, answer.ids_b, strict=True)]
+            self.check_motion(world, np.array(rows, np.int64).reshape(-1, 2), answer, horizon)
 
 
 def _depths(pairs: PairContacts, now: PairDistances) -> FloatArray:

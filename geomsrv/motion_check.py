@@ -10,23 +10,34 @@ apart, and just after it must overlap, by proven intervals of their distance, ex
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from geomsrv import _validate, fcl_worker
 from geomsrv._fcl_supervisor import FclSupervisor
-from geomsrv._judge import Solid, pair_kind
-from geomsrv.answers import ContactStatus
+from geomsrv._judge import AnyShape, Solid, pair_kind
+from geomsrv.answers import ByteArray, ContactStatus
 from geomsrv.broad_phase import boxes_swept, candidates
 from geomsrv.narrow_phase import relative_poses
 from geomsrv.pairwise import listed_distances, listed_first_contacts
-from geomsrv.scene import Scene, SceneObject, SceneUpdate
+from geomsrv.scene import PairContacts, Scene, SceneObject, SceneUpdate
 from geomsrv.shapes import Box, Capsule, Convex, Sphere
 from geomsrv.world import World
 
-__all__ = ["FOLLOWED", "MotionTally", "cross_check_motion", "random_scene"]
+__all__ = [
+    "FOLLOWED",
+    "Found",
+    "MotionRows",
+    "MotionTally",
+    "cross_check_motion",
+    "first_contact_of_two",
+    "judged",
+    "random_scene",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -112,29 +123,117 @@ def cross_check_motion(
     pairs = _moving_pairs(world, end)
     ours = listed_first_contacts(world, pairs, end, accuracy=accuracy)
     tally = MotionTally()
+    rows = MotionRows(world, pairs, np.full(len(pairs), end), ours.time)
+    solids = [Solid.of(shape, number) for number, shape in enumerate(world.table.shapes)]
     fcl = FclSupervisor(timeout_s)
     try:
-        outcome, share = _ask(fcl, world, pairs, end)
+        found = judged(fcl, rows, [(solids[world.shape[i]], solids[world.shape[j]]) for i, j in pairs.tolist()])
     finally:
         fcl.close()
     if fcl.reason:
         return MotionTally(message=fcl.reason)
-    for k, (i, j) in enumerate(pairs.tolist()):
-        kind = pair_kind(*(world.table.shapes[world.shape[row]].kind for row in (i, j)))
-        counts = tally.kinds.setdefault(kind, Counter())
-        if outcome[k] >= fcl_worker.Outcome.FAILED:
-            counts["skipped"] += 1
-            continue
-        hit, meets = outcome[k] == fcl_worker.Outcome.CONTACT, ours.status[k] != ContactStatus.NEVER
-        off = abs(share[k] - ours.time[k] / end) if hit and meets else np.nan
-        if hit == meets and not off > AGREED:
-            counts["agreed"] += 1
-            tally.worst = max(tally.worst, off if hit else 0.0)
-            continue
-        proven = _stands(world, pairs[k], end, ours.time[k])
-        verdict = "fcl_off" if hit else "fcl_missed"
-        counts[verdict if proven else "too_close" if proven is None else "engine_wrong"] += 1
+    for (a, b), one in zip(rows.shapes, found, strict=True):
+        tally.kinds.setdefault(pair_kind(a.kind, b.kind), Counter())[one.verdict] += 1
+        if one.verdict == "agreed" and not np.isnan(one.off):
+            tally.worst = max(tally.worst, one.off)
     return tally
+
+
+def first_contact_of_two(
+    a: AnyShape,
+    pose_a: ArrayLike,
+    velocity_a: ArrayLike,
+    b: AnyShape,
+    pose_b: ArrayLike,
+    velocity_b: ArrayLike,
+    end: float,
+) -> PairContacts:
+    """First contact within `end` seconds of two solids in translation: what a report of a difference repeats."""
+    scene = Scene()
+    states = (("a", a, pose_a, velocity_a), ("b", b, pose_b, velocity_b))
+    add = [SceneObject(name, shape, pose, (*np.asarray(v, float), 0, 0, 0)) for name, shape, pose, v in states]
+    scene.apply(SceneUpdate(add=add))
+    return scene.first_contacts(end)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRows:
+    """Pairs of a world that move, and when each of them is said to meet."""
+
+    world: World
+    pairs: IntArray  #: (k, 2)
+    end: FloatArray  #: (k,) [s] until when FCL is to follow them
+    time: FloatArray  #: (k,) [s], NaN: never
+    prefix: ClassVar[str] = "motion "  #: of their kinds in a tally
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def take(self, index: Sequence[int] | NDArray[np.intp]) -> MotionRows:
+        """Some of the rows."""
+        rows = np.asarray(index, np.intp)
+        return MotionRows(self.world, self.pairs[rows], self.end[rows], self.time[rows])
+
+    @property
+    def shapes(self) -> list[tuple[AnyShape, AnyShape]]:
+        """Of every pair."""
+        table, shape = self.world.table.shapes, self.world.shape
+        return [(table[shape[i]], table[shape[j]]) for i, j in self.pairs.tolist()]
+
+    @classmethod
+    def of(cls, world: World, pairs: IntArray, status: ByteArray, time: FloatArray, horizon: float) -> MotionRows:
+        """Pairs that move relative to each other, and of which it is said whether they meet.
+
+        What never meets can be shown to FCL only up to a horizon that is finite.
+        """
+        a, b = pairs.T
+        moving = (world.twists[a] != world.twists[b]).any(axis=1) & np.isin(status, _SAID)
+        end = np.full(len(pairs), horizon)
+        if np.isinf(horizon):
+            end = np.where(time > 0.0, 2.0 * time, 1.0)
+            moving &= np.isfinite(time)
+        rows = np.flatnonzero(moving & np.isfinite(end))
+        return cls(world, pairs[rows], end[rows], time[rows])
+
+    def followed(self) -> NDArray[np.bool_]:
+        """(k,) bool: pairs whose motion FCL can be asked about."""
+        known = np.array([shape.kind in FOLLOWED for shape in self.world.table.shapes], dtype=bool)[self.world.shape]
+        asked: NDArray[np.bool_] = known[self.pairs].all(axis=1) & ~self.world.turns[self.pairs].any(axis=1)
+        return asked
+
+
+_SAID = (ContactStatus.NEVER, ContactStatus.WILL_TOUCH, ContactStatus.TOUCHING, ContactStatus.OVERLAPPING)
+
+
+class Found(NamedTuple):
+    """What became of one pair."""
+
+    outcome: int  #: of `fcl_worker.Outcome`, or of `NoReply`
+    verdict: str  #: one of `VERDICTS`
+    share: float  #: of the way, at which FCL sees contact begin
+    off: float  #: difference of the times of either, as a share of the way; NaN unless both see a contact
+
+
+def judged(fcl: FclSupervisor, rows: MotionRows, solids: list[tuple[Solid, Solid]]) -> list[Found]:
+    """Ask FCL about pairs that are `followed`, and find out who was wrong where it differs."""
+    world, (a, b) = rows.world, rows.pairs.T
+    ways = rows.end[:, None] * (world.twists[b, :3] - world.twists[a, :3])
+    replies = fcl.ask(solids, relative_poses(world, rows.pairs), np.einsum("nji,nj->ni", world.rotations[a], ways))
+    found = []
+    for k, (outcome, share) in enumerate(zip(replies["outcome"].tolist(), replies["distance"].tolist(), strict=True)):
+        end, time = float(rows.end[k]), float(rows.time[k])
+        hit, meets = outcome == fcl_worker.Outcome.CONTACT, not np.isnan(time)
+        off = abs(share - time / end) if hit and meets else np.nan
+        if outcome >= fcl_worker.Outcome.FAILED:
+            verdict = "skipped"
+        elif hit == meets and not off > AGREED:
+            verdict = "agreed"
+        else:
+            proven = _stands(world, rows.pairs[k], end, time)
+            blame = "fcl_off" if hit else "fcl_missed"
+            verdict = blame if proven else "too_close" if proven is None else "engine_wrong"
+        found.append(Found(outcome, verdict, share, off))
+    return found
 
 
 def random_scene(seed: int | np.random.Generator, count: int) -> Scene:
@@ -155,23 +254,9 @@ def random_scene(seed: int | np.random.Generator, count: int) -> Scene:
 def _moving_pairs(world: World, horizon: float) -> IntArray:
     """Pairs of solids in translation relative to each other whose swept boxes meet, allowed ones aside."""
     found = candidates(world, world.families[0], boxes_swept(world, horizon)).pairs
-    known = np.array([shape.kind in FOLLOWED for shape in world.table.shapes], dtype=bool)[world.shape]
-    a, b = found.T
-    kept = known[a] & known[b] & ~world.turns[a] & ~world.turns[b]
-    kept &= (world.twists[a, :3] != world.twists[b, :3]).any(axis=1)
-    moving: IntArray = found[kept]
-    return moving
-
-
-def _ask(fcl: FclSupervisor, world: World, pairs: IntArray, horizon: float) -> tuple[FloatArray, FloatArray]:
-    """FCL's outcomes, and the shares of the way at which it sees contact begin."""
-    solids = [Solid.of(shape, number) for number, shape in enumerate(world.table.shapes)]
-    a, b = pairs.T
-    poses, ways = relative_poses(world, pairs), horizon * (world.twists[b, :3] - world.twists[a, :3])
-    steps = np.einsum("nji,nj->ni", world.rotations[a], ways)
-    asked = [(solids[world.shape[i]], solids[world.shape[j]]) for i, j in pairs.tolist()]
-    replies = fcl.ask(asked, poses, steps)
-    return replies["outcome"], replies["distance"]
+    never = np.full(len(found), np.nan)
+    rows = MotionRows.of(world, found, np.full(len(found), ContactStatus.NEVER, np.uint8), never, horizon)
+    return rows.pairs[rows.followed()]
 
 
 def _stands(world: World, pair: IntArray, horizon: float, time: float) -> bool | None:
@@ -188,7 +273,10 @@ def _stands(world: World, pair: IntArray, horizon: float, time: float) -> bool |
             low, high = (low, high - third) if left < right else (low + third, high)
         lower, upper = _bounds(world, pair, 0.5 * (low + high))
         return True if lower > 0.0 else False if upper < 0.0 else None
-    apart = time == 0.0 or _bounds(world, pair, max(0.0, time - step))[0] > 0.0
+    if time == 0.0:  # and perhaps parted soon after
+        lower, upper = _bounds(world, pair, 0.0)
+        return True if upper < 0.0 else False if lower > 0.0 else None
+    apart = _bounds(world, pair, max(0.0, time - step))[0] > 0.0
     lower, upper = _bounds(world, pair, time + step)
     if apart and upper < 0.0:
         return True

@@ -51,8 +51,8 @@ def active(engine, asked=EVERYTHING) -> set[str]:
 def test_everything_runs_when_asked_for() -> None:
     engine = make()
     stages = {stage.name: stage for stage in engine.plan(EVERYTHING)}
-    assert active(engine) == stages.keys() - {"cross_check", "rotation"}
-    assert stages["cross_check"].reason == "cross_check.mode is off"
+    assert active(engine) == stages.keys() - {"cross_check", "motion_check", "rotation"}
+    assert stages["cross_check"].reason == stages["motion_check"].reason == "cross_check.mode is off"
     answer = engine.evaluate(EVERYTHING)
     assert answer.contacts and answer.distances and answer.visible
     assert answer.contacts.depth.tolist()[0] == pytest.approx(0.25) and answer.contacts.checked == 4
@@ -254,6 +254,21 @@ def test_words_that_yaml_reads_as_booleans() -> None:
     assert (config.effects_cull, config.effects_witness, config.cross_check_mode) == ("off", "on", "off")
     with pytest.raises(gs.GeometryError, match="effects.cull must be one of auto, on, off, got 'maybe'"):
         Config().changed({"effects.cull": "maybe"})
+
+
+def test_first_contacts_are_handed_to_the_cross_check(monkeypatch) -> None:
+    """Those of what moves, unless they are at a margin, or off."""
+    for changes, count in (({}, 1), ({"contacts_margin": 0.1}, 0), ({"effects_cross_check": "off"}, 0)):
+        engine = make()
+        engine.configure(Config(cross_check_mode="all", accuracy="float64", **changes))
+        taken: list[tuple] = []
+        monkeypatch.setattr(engine.cross_check, "submit_motion", lambda *given, taken=taken: taken.append(given))
+        engine.evaluate(frozenset({CONTACTS}))
+        assert len(taken) == count == engine.counters["motion_check"], changes
+        for world, pairs, answer, horizon in taken:
+            names = [(world.ids[i], world.ids[j]) for i, j in pairs.tolist()]
+            assert names == list(zip(answer.ids_a, answer.ids_b, strict=True)) and horizon == engine.config.horizon
+        engine.close()
 
 
 def test_the_cross_check_can_be_switched_alone() -> None:

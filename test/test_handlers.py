@@ -1013,3 +1013,12 @@ def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     desk.ask("Distance", select=ALL, max_distance=1.0)
     scene, near = taken[1]
     assert scene is desk.engine.scene and near.ids_a == ["ball"] and near.version == scene.version
+    monkeypatch.setattr(desk.engine.cross_check, "submit_motion", lambda *given: moving.append(given))
+    moving: list[tuple] = []
+    desk.ask("FirstContact", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "sheet"], horizon=3.0)
+    desk.ask("FirstContact", select=ALL, horizon=5.0)
+    desk.ask("FirstContact", select=ALL, horizon=5.0, margin=0.5)
+    (world, pairs, answer, horizon), (_, all_pairs, _, _) = moving
+    assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "sheet"]]
+    assert len(answer.status) == 2 and horizon == 3.0
+    assert [[world.ids[k] for k in pair] for pair in all_pairs] == [["left", "right"]]

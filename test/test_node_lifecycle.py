@@ -415,6 +415,33 @@ def test_the_cross_check_tallies(client) -> None:
         assert got.cross_check_mode == "all"
 
 
+def test_first_contacts_are_tallied(client) -> None:
+    """Those on the stream, and those that a service answers."""
+    pytest.importorskip("fcl")
+    with running_node(cross_check__mode="all", max_rate=1000.0):
+        contacts = client.listen(msg.ContactArray, "contacts", OUTPUTS[0].qos)
+        update = msg.SceneUpdate(
+            add=[
+                body("a", gs.Sphere(1.0), velocity=(1, 0, 0)),
+                body("b", gs.Box([1, 1, 1]), (3.5, 0.25, 0.125)),
+                body("c", gs.Cone(1.0, 1.0), (4, 9, 0), velocity=(0, -2, 0)),
+            ]
+        )
+        client.call(srv.ApplyScene, "apply_scene", update=update)
+        contacts.wait(lambda m: len(m.contacts) == 1)
+        states = client.listen(msg.EngineState, "state", STATE.qos)
+        got = states.wait(lambda m: sum(m.cross_check_agreed) >= 1)
+        kinds = dict(zip(got.cross_check_kinds, got.cross_check_agreed, strict=True))
+        assert kinds["motion box-sphere"] >= 1 and sum(got.cross_check_unexplained) == 0
+        plan = dict(zip(got.plan_stages, got.plan_active, strict=True))
+        assert plan["motion_check"] == 1 and plan["cross_check"] == 0
+        client.call(srv.FirstContact, "first_contact", select=0, ids_a=["c"], ids_b=["b"], horizon=9.0)
+        got = states.wait(lambda m: "motion box-cone" in m.cross_check_kinds)
+        assert list(got.cross_check_skipped)[list(got.cross_check_kinds).index("motion box-cone")] == 1
+        told = client.listen(DiagnosticArray, "/diagnostics", DIAGNOSTICS.qos)
+        told.wait(lambda m: any(value.key == "motion box-sphere" for status in m.status for value in status.values))
+
+
 def test_every_service_of_the_table_is_named_in_its_answer() -> None:
     assert sorted(SERVICES) == sorted(
         "cull distance first_contact cull_batch distance_batch first_contact_batch "

@@ -320,6 +320,8 @@ class Handlers:
             )
             order = np.argsort(answer.time, kind="stable")
             response.ids_a = [answer.ids_a[i] for i in order.tolist()]
+            if request.margin == 0.0:
+                self.engine.check_scene_motion(answer, request.horizon)
             response.ids_b = [answer.ids_b[i] for i in order.tolist()]
             response.scene_version = answer.version
             self._set_age(response)
@@ -340,6 +342,8 @@ class Handlers:
             )
             order = None  # that of the request
             if request.certificates:
+            if request.margin == 0.0:
+                self.engine.check_motion(world, pairs, answer, request.horizon)
                 lines = contact_certificates(world, pairs, request.horizon, accuracy=_proof_tier(quality))
                 response.certificates = list(lines)
             if request.select == BY_IDS:
