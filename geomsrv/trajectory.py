@@ -26,7 +26,7 @@ from geomsrv.errors import GeometryError
 from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze, vertices_of
 from geomsrv.world import ROUNDOFF
 
-__all__ = ["AcceleratedMotion", "Trajectory", "first_contact_along"]
+__all__ = ["AcceleratedMotion", "Search", "Trajectory", "first_contact_along"]
 
 # Where a piece puts a point, relative to the coordinates involved: the matrix of a quaternion that is normalised to
 # an ulp is good to 8 u in each entry, 24 u as a matrix; the twist of a piece is found from its ends by a quotient
@@ -302,8 +302,9 @@ def first_contact_along(
         names = " or ".join(kind.__name__ for kind in kinds)
         raise GeometryError(f"obstacles must be {names} for such a motion, got {type(obstacles).__name__}")
     drift = _validate.velocities(velocities, len(obstacles), 2 if motion.planar else 3)
-    search = _Search(vertices, motion, obstacles, drift, step)
-    status, lower, upper = search.run()
+    search = Search(vertices, motion, obstacles, drift, step)
+    search.run()
+    status, lower, upper = search.status, search.lower, search.upper
     certain = (status < ContactStatus.UNSUPPORTED) & ((status != ContactStatus.TOUCHING) | (upper == motion.start))
     return CollisionTimes(
         status=status,
@@ -315,8 +316,12 @@ def first_contact_along(
     )
 
 
-class _Search:
-    """Obstacle by obstacle, the first piece with a contact, halved until it can be told."""
+class Search:
+    """Obstacle by obstacle, the first piece with a contact, halved until it can be told.
+
+    `room` (n, 3) is, for each obstacle, the margin [m] up to which the bodies are in contact, and what they may be off
+    by in place [m] and velocity [m/s]: the answer holds for all bodies within.
+    """
 
     def __init__(
         self,
@@ -325,32 +330,35 @@ class _Search:
         obstacles: Polygons | Boxes | Polytopes,
         drift: FloatArray,
         step: float,
+        room: FloatArray | None = None,
     ) -> None:
         self._vertices, self._motion, self._drift, self._step = vertices, motion, drift, step
         self._reach = float(np.linalg.norm(vertices, axis=1).max())
         self._obstacles = obstacles
-        corner = obstacles.center if isinstance(obstacles, Boxes) else obstacles.vertices
-        self._far = float(np.abs(corner).sum(axis=1).max(initial=0.0))
-        if isinstance(obstacles, Boxes):
-            self._far += float(np.linalg.norm(obstacles.half_extents, axis=1).max(initial=0.0))
         count = len(obstacles)
+        self._far = np.zeros(count)  # of each alone, so that no answer depends on what else is asked about
+        if isinstance(obstacles, Boxes):
+            self._far += np.abs(obstacles.center).sum(axis=1) + np.linalg.norm(obstacles.half_extents, axis=1)
+        elif count:
+            self._far += np.maximum.reduceat(np.abs(obstacles.vertices).sum(axis=1), obstacles.offsets[:-1])
         self.status = np.full(count, ContactStatus.NEVER, np.uint8)
         self.lower, self.upper = np.full(count, np.nan), np.full(count, np.nan)
+        self.normal, self.point = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+        self._room = np.zeros((count, 3)) if room is None else room
         self.looked_at = 0
 
-    def run(self) -> tuple[ByteArray, FloatArray, FloatArray]:
-        """Status, lower and upper of every obstacle."""
+    def run(self) -> None:
+        """Find the status of every obstacle, its times, and normal and point at the earlier one."""
         open_rows: IntArray = np.arange(len(self.status))
         for start, end in self._motion.pieces():
             if not len(open_rows):
                 break
             open_rows = self._follow(open_rows, start, end)
-        return self.status, self.lower, self.upper
 
     def _follow(self, rows: IntArray, start: float, end: float) -> IntArray:
         """Settle what has a contact between two times; returns the rows that have none."""
         piece = self._motion.piece(start, end)
-        status, lower, upper, fine = self._ask(rows, piece)
+        status, lower, upper, normal, point, fine = self._ask(rows, piece)
         free = status == ContactStatus.NEVER
         at_start = start == self._motion.start
         proven = np.isfinite(upper) & (upper - lower <= self._step)
@@ -361,6 +369,7 @@ class _Search:
         done, vague = rows[settled], rows[~free & ~settled]
         if len(done):
             self._settle(done, status[settled], lower[settled], upper[settled], proven[settled], at_start)
+            self.normal[done], self.point[done] = normal[settled], point[settled]
         if len(vague):
             middle = start + 0.5 * (end - start)
             vague = self._follow(self._follow(vague, start, middle), middle, end)
@@ -382,7 +391,9 @@ class _Search:
         self.status[rows] = np.where(there, status, named) if at_start else named
         self.lower[rows], self.upper[rows] = lower, upper
 
-    def _ask(self, rows: IntArray, piece: Piece) -> tuple[ByteArray, FloatArray, FloatArray, bool]:
+    def _ask(
+        self, rows: IntArray, piece: Piece
+    ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
         """The engine's answer on a piece, in times of the motion, and whether it is as fine as it can be."""
         self.looked_at += len(rows)
         flat, length = self._motion.planar, piece.end - piece.start
@@ -394,19 +405,20 @@ class _Search:
         rounding = PLACE_ROUNDING * (
             self._reach * (1.0 + length * float(np.linalg.norm(piece.angular)))
             + float(np.abs(piece.place).sum() + length * np.abs(piece.linear).sum())
-            + self._far
-            + float(np.abs(self._drift).max(initial=0.0)) * (since + length)
+            + self._far[rows]
+            + np.abs(self._drift).max(axis=1)[rows if len(self._drift) > 1 else 0] * (since + length)
         )
         stray = piece.straying + piece.leaning * self._reach
-        slack = np.array([[0.0, rounding + stray, 0.0]])
+        slack = self._room[rows]
+        slack[:, 1] += rounding + stray + since * (1.0 + PLACE_ROUNDING) * slack[:, 2]
         found = _core.first_contact_turning(body, others, motion, motions, length, 0.5 * self._step, slack)
         shift = np.where(np.isnan(found[1]), 0.0, piece.start)
         # Rounding of the sum; the piece's own ends are exact.
         lower = np.maximum(np.nextafter(found[1] + shift, -np.inf), piece.start)
         upper = np.nextafter(found[2] + shift, np.inf)
         upper = np.where(found[2] == 0.0, piece.start, upper)
-        fine = stray <= rounding or length <= FINEST * self._step
-        return found[0], lower, upper, fine
+        fine = (stray <= rounding) | (length <= FINEST * self._step)
+        return found[0], lower, upper, found[3], found[4], fine
 
     def _others(self, rows: IntArray, since: float) -> tuple[tuple[FloatArray | IntArray, ...], FloatArray]:
         """The obstacles of some rows after a while, and their motions."""

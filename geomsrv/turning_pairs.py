@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -46,9 +47,11 @@ __all__ = [
     "climbed_contact_rows",
     "closing_speeds",
     "contact_rows",
+    "core_of_solids",
     "first_contact_row",
     "followed_in_turning",
     "nearness",
+    "radii",
 ]
 
 # The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
@@ -358,7 +361,7 @@ def _turning_contacts(world: World, pairs: IntArray, question: Question) -> Cont
         lower[vague] = np.where(never, first, np.fmin(first, lower[vague]))
         upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
     # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
-    radius = _radius(world)[pairs]
+    radius = radii(world)[pairs]
     uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
     point[uneven] += 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
     points = np.empty(len(pairs), dtype=object)
@@ -423,12 +426,17 @@ def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatA
     return np.concatenate(items), np.cumsum([0, *map(len, items)], dtype=np.int64)
 
 
+def core_of_solids(world: World, rows: IntArray) -> tuple[Any, ...]:
+    """Vertices and offsets of hulls, and of the cores of spheres and capsules, in the fixed frame."""
+    return _side(world, rows, False, False)
+
+
 def _core_of(world: World, row: int) -> tuple[FloatArray | IntArray, ...]:
     """The same for one solid."""
     return _side(world, np.array([row]), False, bool(world.table.boxes[world.shape[row]]))
 
 
-def _radius(world: World) -> FloatArray:
+def radii(world: World) -> FloatArray:
     """(n,) rounding radius of spheres and capsules."""
     codes = [code for code, name in enumerate(_core.shape_kinds()) if name in ("sphere", "capsule")]
     radius: FloatArray = np.where(np.isin(world.kinds, codes), world.table.round[world.shape], 0.0)
@@ -442,7 +450,7 @@ def _slack(world: World, pairs: IntArray, nearness: float) -> FloatArray:
     size = np.abs(world.poses[:, :3]).sum(axis=1) + world.table.reach[world.shape]
     ends = np.where(world.kinds == names.index("capsule"), CAPSULE_ROUNDING * size, 0.0)
     looked = _by_distance(world, pairs)  # at the bodies as they are, not at cores
-    margin = np.where(looked, 0.0, _radius(world)[pairs].sum(axis=1)) + nearness
+    margin = np.where(looked, 0.0, radii(world)[pairs].sum(axis=1)) + nearness
     off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + 2.0 * ROUNDOFF * margin
     off = np.where(looked, 2.0 * ROUNDOFF * nearness, off)
     return np.column_stack([margin, off, np.zeros(len(pairs))])

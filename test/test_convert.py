@@ -296,7 +296,7 @@ def test_every_field_and_constant_is_explained(name) -> None:
 
 def test_status_means_the_same_everywhere() -> None:
     names = ("OK", "BAD_REQUEST", "UNSUPPORTED", "NOT_AVAILABLE", "NOT_ACTIVE", "INTERNAL_ERROR")
-    assert len(SERVICES) == 8
+    assert len(SERVICES) == 9
     for service in SERVICES:
         kind = message(f"geomsrv/{service}_Response")
         assert [getattr(kind, name) for name in names] == list(range(6)), service
@@ -307,7 +307,7 @@ def test_outcomes_are_those_of_python() -> None:
     contact = message("geomsrv/Contact")
     for outcome in gs.ContactStatus:
         assert getattr(contact, outcome.name) == outcome
-        for service in ("FirstContact", "FirstContactBatch"):
+        for service in ("FirstContact", "FirstContactBatch", "FirstContactAlong"):
             kind = message(f"geomsrv/{service}_Response")
             assert getattr(kind, f"ITEM_{outcome.name}", None) == outcome or getattr(kind, outcome.name) == outcome
     for outcome in gs.answers.DistanceStatus:

@@ -678,6 +678,55 @@ BAD = [
         },
         "want must name",
     ),
+    ("FirstContactAlong", {}, "shape must be one, where id is empty; got 0"),
+    ("FirstContactAlong", {"id": "nobody"}, "id is 'nobody': no such object"),
+    ("FirstContactAlong", {"id": "ball", "shape": shapes(gs.Sphere(1.0))}, "shape must be empty here"),
+    ("FirstContactAlong", {"id": "ball"}, "times and poses must be as many, at least two; got 0 and 0"),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1]), "poses": at((0, 0, 0))[:-1]},
+        "poses must hold 7 numbers",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1, 1]), "poses": at((0, 0, 0), (1, 0, 0), (2, 0, 0))},
+        r"times\[2\] must be later than times\[1\] = 1, got 1",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0.5, 1]), "poses": at((0, 0, 0), (1, 0, 0))},
+        r"times\[0\] must be 0, where the path begins: now; got 0.5",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, math.nan]), "poses": at((0, 0, 0), (1, 0, 0))},
+        r"times\[1\] is nan",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1]), "poses": D([0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 2])},
+        r"poses\[1\]",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "left", "times": D([0, 1]), "poses": at((0, 0, 0), (1, 0, 0.5))},
+        r"poses\[1\]: a polygon lies in the plane",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1]), "poses": at((0, 0, 0), (1, 0, 0)), "ids": ["box", "nobody"]},
+        r"ids\[1\] is 'nobody': no such object",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1]), "poses": at((0, 0, 0), (1, 0, 0)), "ids": ["box", "ball"]},
+        r"ids\[1\] is 'ball', the body itself",
+    ),
+    (
+        "FirstContactAlong",
+        {"id": "ball", "times": D([0, 1]), "poses": at((0, 0, 0), (1, 0, 0)), "tolerance": -1.0},
+        "tolerance must be",
+    ),
     ("FirstContactBatch", {"dimension": 4}, "dimension must be 2 or 3, got 4"),
     (
         "FirstContactBatch",
@@ -956,6 +1005,7 @@ def test_certificates_need_a_tier_that_leaves_something_to_prove(desk) -> None:
         ("first_contact", "FirstContact", {"select": ALL}),
         ("contact_set", "FirstContact", {"select": ALL, "want": ["contact_set"]}),
         ("first_contact", "FirstContactBatch", {}),
+        ("first_contact", "FirstContactAlong", {}),
     ],
 )
 def test_effects_that_are_switched_off_are_named(effect, service, fields) -> None:
@@ -997,6 +1047,125 @@ def test_half_filled_answers_are_thrown_away(desk, monkeypatch) -> None:
     assert got.status == INTERNAL_ERROR and is_empty(got)
 
 
+# ---------------------------------------------------------------------------------------------------- along a path
+
+WAY = gs.Trajectory([0.0, 2.0, 3.0], [[-4, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0.6, 0.8]])
+
+
+def along(**fields):
+    return {"times": D(WAY.times), "poses": D(WAY.poses), **fields}
+
+
+def test_first_contact_along_a_path() -> None:
+    """Boxes and hulls as `first_contact_along` has them, balls and capsules as wide as they are; no allowed pairs."""
+    desk = Desk()
+    bar = gs.Box([1.5, 0.1, 0.1])
+    turn = np.array([0.1, 0.2, 0.3, 1.0]) / np.linalg.norm([0.1, 0.2, 0.3, 1.0])
+    hull = gs.Convex(np.random.default_rng(1).normal(size=(9, 3)) * 0.2)
+    things = {
+        "box": gs.SceneObject("box", gs.Box([0.2, 0.3, 0.1]), (1.25, 0.6, 0, *turn)),
+        "hull": gs.SceneObject("hull", hull, (-1.0, 1.5, 0, *turn), (0, -1, 0, 0, 0, 0)),
+        "ball": obj("ball", gs.Sphere(0.25), (1.6, 0.15, 0)),
+        "pill": obj("pill", gs.Capsule(0.2, 1.0), (1.0, 0.9, 0)),
+        "away": obj("away", gs.Sphere(0.25), (0, 9, 0)),
+        "fine": obj("fine", gs.Sphere(0.25), (-2, 0, 0)),
+    }
+    add = [gs.SceneObject("bar", bar), *things.values()]
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=add, allow=[("bar", "fine")]))
+    got = desk.ask("FirstContactAlong", **along(id="bar"))
+    assert got.status == OK and got.message == "" and sorted(got.ids) == ["ball", "box", "hull", "pill"]
+    assert got.time.tolist() == sorted(got.time) and set(got.item_status) == {1}
+    assert got.scene_version == desk.engine.scene.version and not got.stale and math.isnan(got.input_age)
+    assert got.cost.accuracy == "float64" and 0 < got.cost.error_bound <= 1e-6
+    spans = dict(zip(got.ids, zip(got.time_lower, got.time_upper, strict=True), strict=True))
+    world = desk.engine.scene.world
+    box = gs.Boxes.from_poses([world.poses[world.index["box"]]], [[0.2, 0.3, 0.1]])
+    row = world.index["hull"]
+    placed = gs.Polytopes(hull.vertices @ world.rotations[row].T + world.poses[row, :3], [0, 9])
+    for name, want in (
+        ("box", gs.first_contact_along(bar, WAY, box)),
+        ("hull", gs.first_contact_along(bar, WAY, placed, velocities=(0, -1, 0))),
+    ):
+        assert spans[name][0] <= want.time_upper[0] and want.time_lower[0] <= spans[name][1], name
+    # The end of the bar is at 2 t - 2.5, and its side at 0.1: a ball whose middle is 0.05 beside it.
+    first = (1.6 - math.sqrt(0.25**2 - 0.05**2) + 2.5) / 2.0
+    assert spans["ball"][0] <= first + 1e-9 and first - 1e-9 <= spans["ball"][1]
+    k = list(got.ids).index("ball")
+    point, normal = np.reshape(got.point, (-1, 3))[k], np.reshape(got.normal, (-1, 3))[k]
+    np.testing.assert_allclose(point, [1.6 - math.sqrt(0.25**2 - 0.05**2), 0.1, 0.0], atol=1e-5)
+    np.testing.assert_allclose(normal, (np.array([1.6, 0.15, 0]) - point) / 0.25, atol=1e-4)
+    # Of a pill about z, the bar on the spot sees a disc: its upper side comes to it.
+    angle = np.arctan2(0.9, 1.0) - np.arcsin((0.1 + 0.2) / np.hypot(1.0, 0.9))
+    when = 2.0 + angle / (2.0 * np.arctan2(0.6, 0.8))
+    assert spans["pill"][0] <= when + 1e-9 and when - 1e-9 <= spans["pill"][1]
+    # Listed ones in the order of the request, allowed or not, and the same from an inline shape.
+    listed = desk.ask("FirstContactAlong", **along(shape=shapes(bar), ids=["away", "fine", "ball"]))
+    assert list(listed.ids) == ["away", "fine", "ball"] and listed.item_status.tolist() == [0, 1, 1]
+    assert math.isnan(listed.time[0]) and listed.time[1] == pytest.approx((-2 - 0.25 + 2.5) / 2.0, abs=1e-5)
+    assert listed.time[2] == spans["ball"][0]
+    fine = desk.ask("FirstContactAlong", **along(id="bar", ids=["ball"], tolerance=1e-9))
+    assert fine.time_upper[0] - fine.time_lower[0] <= 1e-9
+
+
+def test_first_contact_along_a_path_in_the_plane() -> None:
+    desk = Desk()
+    slow = gs.Trajectory([0.0, 4.0], [[0, 0, 0, 0, 0, 0, 1], [4, 0, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5)]])
+    got = desk.ask("FirstContactAlong", id="left", times=D(slow.times), poses=D(slow.poses))
+    ring = gs.Polygons.from_list([SQUARE.vertices + [3, 0.5]])
+    want = gs.first_contact_along(SQUARE, gs.Trajectory([0.0, 4.0], [[0, 0, 0], [4, 0, np.pi / 2]]), ring)
+    assert got.status == OK and list(got.ids) == ["right"] and got.item_status.tolist() == [1]
+    assert got.time_lower[0] <= want.time_upper[0] and want.time_lower[0] <= got.time_upper[0]
+    assert got.point[2] == 0.0 and got.normal[2] == 0.0
+    assert desk.engine.totals.rows["~/first_contact_along", "float64"][1] == 1
+
+
+def test_first_contact_along_a_path_of_what_is_uncertain() -> None:
+    """0.1 m and 0.1 m/s nearer or farther, head on at 1 m/s; and one that is missed by less than that."""
+    desk = Desk()
+    cube = gs.Box([0.5, 0.5, 0.5])
+    add = [
+        obj("cube", cube, (5, 0, 0), uncertainty=0.05),
+        obj("there", cube, (3, 0, 0), uncertainty=0.05, velocity_uncertainty=0.1),
+        obj("beside", cube, (3, 1.08, 3), uncertainty=0.05),
+    ]
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=add))
+    for z, ids in ((0, ["there"]), (3, ["beside"])):
+        path = {"times": D([0.0, 4.0]), "poses": D([[0, 0, z, 0, 0, 0, 1], [4, 0, z, 0, 0, 0, 1]])}
+        got = desk.ask("FirstContactAlong", id="cube", **path)
+        assert got.status == OK and list(got.ids) == ids, z
+        if z == 0:
+            assert got.item_status[0] == 1 and got.time[0] == pytest.approx(2.0, abs=1e-6)
+            assert got.time_lower[0] <= 1.9 / 1.1 <= got.time_lower[0] + 1e-4
+            assert 2.1 / 0.9 <= got.time_upper[0]
+        else:
+            assert got.item_status[0] == 0 and math.isnan(got.time[0]) and got.time_upper[0] == math.inf
+            assert 1.9 <= got.time_lower[0] <= 2.0 and got.cost.error_bound == math.inf
+
+
+def test_first_contact_along_a_path_says_what_it_cannot() -> None:
+    desk = Desk()
+    add = [
+        gs.SceneObject("spin", gs.Box([1, 1, 1]), (0, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1)),
+        gs.SceneObject("lost", gs.Sphere(1.0), motion_fault="it jumps"),
+        obj("can", gs.Cylinder(1.0, 1.0)),
+    ]
+    desk.engine.apply(gs.SceneUpdate(add=add))
+    got = desk.ask(
+        "FirstContactAlong", **along(shape=shapes(gs.Sphere(0.5)), ids=["spin", "lost", "can", "box", "sheet"])
+    )
+    assert got.status == UNSUPPORTED and got.item_status.tolist() == [4, 4, 4, 1, 4] and math.isnan(got.time[0])
+    for text in ("with what turns (box-sphere)", "(cylinder-sphere)", "(mesh-sphere)"):
+        assert text in got.message
+    got = desk.ask("FirstContactAlong", **along(id="can", ids=["box", "left"]))
+    assert got.status == UNSUPPORTED and "box-cylinder" in got.message and "cylinder-polygon" in got.message
+    nothing = Desk()
+    nothing.engine.apply(gs.SceneUpdate(clear=True))
+    got = nothing.ask("FirstContactAlong", **along(shape=shapes(gs.Sphere(0.5))))
+    assert got.status == OK and len(got.ids) == len(got.time) == 0
+    got = Desk(effects__rotation=False).ask("FirstContactAlong", **along(id="box"))
+    assert got.status == NOT_AVAILABLE and "effects.rotation" in got.message
+
+
 # ---------------------------------------------------------------------------------------------------- cross-check
 
 
@@ -1010,9 +1179,6 @@ def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     ((world, pairs, answer),) = taken
     assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "sheet"]]
     assert answer.status.tolist() == [0, 2] and len(answer.distance) == 2
-    desk.ask("Distance", select=ALL, max_distance=1.0)
-    scene, near = taken[1]
-    assert scene is desk.engine.scene and near.ids_a == ["ball"] and near.version == scene.version
     monkeypatch.setattr(desk.engine.cross_check, "submit_motion", lambda *given: moving.append(given))
     moving: list[tuple] = []
     desk.ask("FirstContact", select=BY_IDS, ids_a=["far", "ball"], ids_b=["ball", "sheet"], horizon=3.0)
@@ -1022,3 +1188,6 @@ def test_distances_are_handed_to_the_cross_check(monkeypatch) -> None:
     assert [[world.ids[k] for k in pair] for pair in pairs] == [["far", "ball"], ["ball", "sheet"]]
     assert len(answer.status) == 2 and horizon == 3.0
     assert [[world.ids[k] for k in pair] for pair in all_pairs] == [["left", "right"]]
+    desk.ask("Distance", select=ALL, max_distance=1.0)
+    scene, near = taken[1]
+    assert scene is desk.engine.scene and near.ids_a == ["ball"] and near.version == scene.version

@@ -445,5 +445,5 @@ def test_first_contacts_are_tallied(client) -> None:
 def test_every_service_of_the_table_is_named_in_its_answer() -> None:
     assert sorted(SERVICES) == sorted(
         "cull distance first_contact cull_batch distance_batch first_contact_batch "
-        "apply_scene get_scene clear self_check set_enabled".split()
+        "first_contact_along apply_scene get_scene clear self_check set_enabled".split()
     )

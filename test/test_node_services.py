@@ -192,6 +192,7 @@ BAD = [
     (srv.CullBatch, "cull_batch", {"frustum": array.array("d", [1.0])}, "frustum must hold 18 numbers"),
     (srv.DistanceBatch, "distance_batch", {"kind_a": 200}, "kind_a 200"),
     (srv.FirstContactBatch, "first_contact_batch", {"offsets_a": array.array("I", [0, 4])}, "offsets"),
+    (srv.FirstContactAlong, "first_contact_along", {"id": "nobody"}, "nobody"),
     (srv.GetScene, "get_scene", {"ids": ["nobody"]}, "nobody"),
 ]
 
@@ -202,6 +203,28 @@ def test_bad_requests_are_answered(client, kind, name, fields, text) -> None:
     got = client.call(kind, name, **fields)
     assert got.status == got.BAD_REQUEST and text in got.message
     assert client.call(srv.GetScene, "get_scene") == before
+
+
+def test_first_contact_along_a_path(client) -> None:
+    """The body turns on the spot, and then goes straight on."""
+    bar, wall = gs.Box([1.0, 0.1, 0.1]), gs.Box([0.1, 5.0, 5.0])
+    client.call(
+        srv.ApplyScene, "apply_scene", update=msg.SceneUpdate(add=[body("bar", bar), body("wall", wall, (3, 0, 0))])
+    )
+    poses = [[0, 0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0.6, 0.8], [4, 0, 0, 0, 0, 0.6, 0.8]]
+    got = client.call(
+        srv.FirstContactAlong,
+        "first_contact_along",
+        id="bar",
+        ids=["wall"],
+        times=convert.doubles([0.0, 1.0, 3.0]),
+        poses=convert.doubles(poses),
+    )
+    # Turned, cosine 0.28 and sine 0.96, it reaches 0.28 + 0.096 along x.
+    assert got.status == got.OK and list(got.ids) == ["wall"] and list(got.item_status) == [got.WILL_TOUCH]
+    assert got.time_lower[0] - 1e-9 <= 1.0 + (2.9 - 0.376) / 2.0 <= got.time_upper[0] + 1e-9
+    assert list(got.normal) == pytest.approx([1, 0, 0], abs=1e-6) and got.point[0] == pytest.approx(2.9, abs=1e-5)
+    assert got.cost.accuracy == "float64" and got.scene_version > 0
 
 
 def test_a_million_boxes(client) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _validate, queries
+from geomsrv.along_pairs import contacts_along, path_of
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus, gather
 from geomsrv.effects import OFF, ON
 from geomsrv.engine import Engine
@@ -28,7 +29,8 @@ from geomsrv.pairwise import Bodies, ListedContacts, distance_of_two, listed_dis
 from geomsrv.proofs import contact_certificates, cull_certificates, distance_certificates
 from geomsrv.ros import convert
 from geomsrv.scene import PairContacts, SceneUpdate
-from geomsrv.shapes import Boxes, Frustum, Polygons, Polytopes
+from geomsrv.shapes import Boxes, Frustum, Polygon, Polygons, Polytopes
+from geomsrv.turning import TIME_TOLERANCE
 from geomsrv.visibility import seen
 from geomsrv.world import World
 
@@ -318,10 +320,10 @@ class Handlers:
                 rotation=rotation,
                 **quality,
             )
-            order = np.argsort(answer.time, kind="stable")
-            response.ids_a = [answer.ids_a[i] for i in order.tolist()]
             if request.margin == 0.0:
                 self.engine.check_scene_motion(answer, request.horizon)
+            order = np.argsort(answer.time, kind="stable")
+            response.ids_a = [answer.ids_a[i] for i in order.tolist()]
             response.ids_b = [answer.ids_b[i] for i in order.tolist()]
             response.scene_version = answer.version
             self._set_age(response)
@@ -340,10 +342,10 @@ class Handlers:
                 rotation=rotation,
                 **quality,
             )
-            order = None  # that of the request
-            if request.certificates:
             if request.margin == 0.0:
                 self.engine.check_motion(world, pairs, answer, request.horizon)
+            order = None  # that of the request
+            if request.certificates:
                 lines = contact_certificates(world, pairs, request.horizon, accuracy=_proof_tier(quality))
                 response.certificates = list(lines)
             if request.select == BY_IDS:
@@ -438,7 +440,55 @@ class Handlers:
         _set_certificates(response, answer)
         _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
 
+    @_answered()
+    def first_contact_along(self, request: Any, response: Any) -> None:
+        """FirstContactAlong.srv."""
+        self._allowed("first_contact")
+        world = self.engine.scene.world
+        body, off, row = self._body(request, world)
+        path = path_of(
+            convert.floats(request.times), convert.rows(request.poses, "poses", 7), isinstance(body, Polygon)
+        )
+        turn = path.poses[:, 2 if path.planar else 3 :]
+        if (turn != turn[0]).any():
+            self._allowed("rotation")
+        if request.ids:
+            rows = np.array(_rows_of(world, request.ids, "ids"), dtype=np.int64)
+            if len(same := np.flatnonzero(rows == row)):
+                raise GeometryError(f"ids[{same[0]}] is {request.id!r}, the body itself")
+        else:
+            rows = _others_of(world, row, isinstance(body, Polygon))
+        answer = contacts_along(world, body, off, path, rows, request.tolerance or TIME_TOLERANCE)
+        order: IntArray = np.arange(len(rows))
+        if not request.ids:
+            # What may meet is listed, too, and what is unsupported comes last.
+            met = np.flatnonzero((answer.status != ContactStatus.NEVER) | ~np.isnan(answer.time_lower))
+            order = met[np.argsort(answer.time[met], kind="stable")]
+        response.ids = [world.ids[i] for i in rows[order].tolist()]
+        response.scene_version = world.version
+        self._set_age(response)
+        response.item_status = convert.bytes_(answer.status[order])
+        for name in ("time", "time_lower", "time_upper", "normal", "point"):
+            setattr(response, name, convert.doubles(getattr(answer, name)[order]))
+        self._set_cost(response, "~/first_contact_along", answer, len(rows))
+        _set_unsupported(response, answer.status == ContactStatus.UNSUPPORTED, answer.message)
+
     # ---------------------------------------------------------------------------------------------------- requests
+
+    def _body(self, request: Any, world: World) -> tuple[Any, float, int]:
+        """What follows a path: its shape, how far it may be off, and its row in the world, -1 if it is none of it."""
+        if request.id:
+            _unused(request, "shape")
+            if request.id not in world.index:
+                raise GeometryError(f"id is {request.id!r}: no such object")
+            row = world.index[request.id]
+            return world.table.shapes[world.shape[row]], float(world.uncertainty[row]), row
+        if len(request.shape) != 1:
+            raise GeometryError(f"shape must be one, where id is empty; got {len(request.shape)}")
+        try:
+            return convert.shape_from(request.shape[0]), 0.0, -1
+        except GeometryError as fault:
+            raise GeometryError(f"shape[0]: {fault}") from None
 
     def _quality(self, request: Any) -> dict[str, Any]:
         """How good the answer is asked to be, as queries take it; the tier by default that of the configuration."""
@@ -568,6 +618,16 @@ def _rows_of(world: World, ids: Sequence[str], name: str) -> Sequence[int]:
     except KeyError:
         unknown = [f"{name}[{i}] is {item!r}" for i, item in enumerate(ids) if item not in world.index]
         raise GeometryError(f"{', '.join(unknown)}: no such object") from None
+
+
+def _others_of(world: World, row: int, flat: bool) -> IntArray:
+    """Objects of the same family, but for the one in a row and what it is allowed to touch."""
+    others = np.flatnonzero(world.planar == flat)
+    if row >= 0:
+        others = others[others != row]
+        keys = np.minimum(others, row) * len(world) + np.maximum(others, row)
+        others = others[~np.isin(keys, world.allowed)]
+    return others
 
 
 def _bodies(shapes: Sequence[Any], poses: Any, twists: Any, suffix: str = "") -> Bodies:

@@ -93,6 +93,7 @@ SERVICES = {
     "cull_batch": srv.CullBatch,
     "distance_batch": srv.DistanceBatch,
     "first_contact_batch": srv.FirstContactBatch,
+    "first_contact_along": srv.FirstContactAlong,
     "apply_scene": srv.ApplyScene,
     "get_scene": srv.GetScene,
     "clear": Trigger,
