@@ -429,6 +429,36 @@ def same_times(one, other, scale=1.0):
     return hit
 
 
+@pytest.mark.parametrize("accuracy", ["float64", "exact"])
+def test_neighbours_in_a_batch_change_nothing(rng, accuracy):
+    # Pairs are sorted by size and decided four at a time; some are too large for that, points or segments.
+    def ring(sides):
+        angles = 2.0 * math.pi * (np.arange(sides) + rng.uniform(-0.3, 0.3, sides)) / sides
+        return rng.uniform(0.2, 2.0) * np.column_stack([np.cos(angles), np.sin(angles)])
+
+    count = 700
+    sides = rng.choice([1, 2, 3, 4, 5, 8, 13, 16, 31, 32, 33, 70], (count, 2))
+    way = rng.normal(size=(count, 2)) * rng.uniform(0.0, 6.0, (count, 1))
+    rings_a, rings_b = ([ring(n) for n in sides[:, k]] for k in (0, 1))
+    a, b = gs.Polygons.from_list(rings_a), gs.Polygons.from_list([r + w for r, w in zip(rings_b, way, strict=True)])
+    velocity_a, velocity_b = rng.normal(size=(count, 2)), rng.normal(size=(count, 2)) - way
+    together = gs.first_contact(a, b, velocity_a, velocity_b, t_max=2.0, accuracy=accuracy)
+    assert set(together.status) >= {gs.NEVER, gs.WILL_TOUCH, gs.OVERLAPPING}
+    for i in range(count):
+        alone = gs.first_contact(
+            gs.Polygons.from_list([rings_a[i]]),
+            gs.Polygons.from_list([rings_b[i] + way[i]]),
+            velocity_a[i : i + 1],
+            velocity_b[i : i + 1],
+            t_max=2.0,
+            accuracy=accuracy,
+        )
+        for name in ("status", "time", "time_lower", "time_upper", "last_time", "normal"):
+            assert np.array_equal(getattr(alone, name)[0], getattr(together, name)[i], equal_nan=True), (i, name)
+        begin, end = together.point_offsets[i : i + 2]
+        assert np.array_equal(alone.points, together.points[begin:end]), i
+
+
 def test_law_swap(batch):
     a, b, va, w = batch
     one, other = solve(a, b, va, va + w), solve(b, a, va + w, va)

@@ -1,5 +1,6 @@
 // Copyright 2026 The geomsrv authors
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "geom/polygon_distance_exact.hpp"
 #include "geom/polygon_first_contact.hpp"
 #include "geom/polygon_first_contact_exact.hpp"
+#include "geom/polygon_motion.hpp"
 #include "geom/polygon_single.hpp"
 
 namespace geomsrv::bind {
@@ -107,8 +109,29 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
     points.reserve(contact_set ? 2 * count : 0);
     Solver solver(largest_ring(a.rings), largest_ring(b.rings));
     rows.point_offsets[0] = 0;
+    constexpr bool kInBlocks =
+        std::is_same_v<Solver, FirstContactSolver> || std::is_same_v<Solver, ExactFirstContactSolver>;
+    std::array<MovingPolygon, kPolygonMotionBlock> block_a;
+    std::array<MovingPolygon, kPolygonMotionBlock> block_b;
+    std::array<PolygonMotion, kPolygonMotionBlock> known;
     for (std::size_t i = 0; i < count; ++i) {
-        const FirstContact contact = solver.solve(a[i], b[i], t_max, contact_set);
+        const std::size_t place = i % kPolygonMotionBlock;
+        if (kInBlocks && place == 0) {
+            const std::size_t many = std::min(count - i, kPolygonMotionBlock);
+            for (std::size_t k = 0; k < many; ++k) {
+                block_a[k] = a[i + k];
+                block_b[k] = b[i + k];
+            }
+            decide_polygon_motions(block_a.data(), block_b.data(), many, t_max,
+                                   std::is_same_v<Solver, ExactFirstContactSolver>, known.data());
+        }
+        const FirstContact contact = [&] {
+            if constexpr (kInBlocks) {
+                return solver.solve(block_a[place], block_b[place], t_max, contact_set, known[place]);
+            } else {
+                return solver.solve(a[i], b[i], t_max, contact_set);
+            }
+        }();
         rows.status[i] = static_cast<std::uint8_t>(contact.status);
         rows.time[i] = contact.time;
         rows.time_lower[i] = contact.time_lower;

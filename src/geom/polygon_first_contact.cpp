@@ -29,6 +29,7 @@
 #include "geom/exact_sign.hpp"
 #include "geom/lanes.hpp"
 #include "geom/polygon_marks.hpp"
+#include "geom/polygon_motion.hpp"
 #include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
@@ -78,13 +79,9 @@ Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
     Timed result;
     result.nominal = rate.value.hi > 0.0 ? quotient(gap.value, rate.value) : DoubleDouble{kInfinity, 0.0};
     const double relative = gap.error / gap.value.hi + rate.error / rate.value.hi;
-    // For x, y below the first (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-19); the second is for rounding of the
-    // bound too.
-    constexpr double kSmallRelative = 0x1p-20;
-    constexpr double kSecondOrder = 1.0 + 0x1p-18;
-    const bool digits_left = gap.value.hi > 0.0 && rate.value.hi > 0.0 && relative < kSmallRelative;
+    const bool digits_left = gap.value.hi > 0.0 && rate.value.hi > 0.0 && relative < kSmallShare;
     if (digits_left && result.nominal.hi < kInfinity) {
-        const double error = result.nominal.hi * (kSecondOrder * relative + kQuotientError);
+        const double error = result.nominal.hi * (kSecondOrderOfTime * relative + kQuotientError);
         result.lower = next_down(result.nominal.hi + (result.nominal.lo - error));
         result.upper = next_up(result.nominal.hi + (result.nominal.lo + error));
         return result;
@@ -101,16 +98,12 @@ Timed closing_time(const Enclosed& gap, const Enclosed& rate) {
     return result;
 }
 
-// A gap and a rate known to this relative error make a time that is good enough as it is, 2^-45: about 50
-// times what rounding leaves of numbers in which nothing cancels.
-constexpr double kSharp = 0x1p-46;
-
 /// The numbers of one axis taken literally, without slack for rounding of the input.
 struct LiteralAxis {
     double gap, rate, gap_error, rate_error;
 
     [[nodiscard]] bool is_sharp() const {
-        return gap_error < kSharp * std::fabs(gap) && rate_error < kSharp * std::fabs(rate);
+        return gap_error < kSharpTime * std::fabs(gap) && rate_error < kSharpTime * std::fabs(rate);
     }
 };
 
@@ -204,7 +197,7 @@ Entry latest_entry(const PolygonPair& pair, const Motion& motion, const Slacks& 
 double earliest_exit(const PolygonPair& pair, const Motion& motion, const Slacks& slacks,
                      std::span<const AxisOf> axes) {
     // What rounding may leave between a tip and the edges beside it: two sharp times.
-    constexpr double kSameTime = 4.0 * kSharp;
+    constexpr double kSameTime = 4.0 * kSharpTime;
     double exit = kInfinity;
     for (const bool redundant : {false, true}) {
         for (const AxisOf axis : axes) {
@@ -374,6 +367,27 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
     result.points =
         contact_points(pair_, motion, marks, {a.velocity, b.velocity}, moment, result.time, points_);
     return result;
+}
+
+FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolygon& b, double t_max,
+                                       bool contact_set, const PolygonMotion& known) {
+    switch (known.verdict) {
+        case PolygonMotion::Verdict::unclear:
+            break;
+        case PolygonMotion::Verdict::never:
+            return {ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN}, {}, true};
+        case PolygonMotion::Verdict::will_touch:
+            points_[0] = known.point;
+            return {ContactStatus::will_touch,
+                    known.time,
+                    known.time_lower,
+                    known.time_upper,
+                    std::min(known.last_time, t_max),
+                    known.normal,
+                    {points_.data(), contact_set ? 1U : 0U},
+                    true};
+    }
+    return solve(a, b, t_max, contact_set);
 }
 
 }  // namespace geomsrv

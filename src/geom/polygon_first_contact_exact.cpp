@@ -13,6 +13,7 @@
 
 #include "geom/exact_sign.hpp"
 #include "geom/lane_arithmetic.hpp"
+#include "geom/polygon_motion.hpp"
 #include "geom/polygon_window.hpp"
 #include "geom/rounding.hpp"
 
@@ -482,8 +483,46 @@ bool find_moments_plain(const Facing& entry, const Facing& exit, Vec2 start, Vec
     return find_moments<TwoRoundings>(entry, exit, start, velocity, place, out);
 }
 
-/// The answer where it is that simple; false if it is not, or in doubt.
-bool resolve_quickly(const Query& query, FirstContact& out, std::array<Vec2, 2>& points) {
+/// The two polygons that an edge and a vertex are of.
+struct Pair {
+    const MovingPolygon& a;
+    const MovingPolygon& b;
+
+    [[nodiscard]] Facing facing(const EdgeAndVertex& at) const {
+        const bool is_a = at.edge.side == 0;
+        const MovingPolygon& own = is_a ? a : b;
+        const MovingPolygon& other = is_a ? b : a;
+        const std::size_t next = at.edge.index + 1 < own.ring.size() ? at.edge.index + 1 : 0;
+        return {own.ring[at.edge.index], own.ring[next], other.ring[at.vertex], own.velocity, other.velocity};
+    }
+};
+
+/// The answer where the first contact is of one edge with one vertex, and the last likewise; false in doubt.
+bool resolve_quickly(const Pair& pair, const EdgeAndVertex& first, const EdgeAndVertex& last, double t_max,
+                     bool contact_set, FirstContact& out, std::array<Vec2, 2>& points) {
+    const Facing entry = pair.facing(first);
+    const auto find = has_fused() ? find_moments_fused : find_moments_plain;
+    Moments found;
+    if (!find(entry, pair.facing(last), entry.lowest, entry.other_velocity, contact_set, found) ||
+        !(found.first.upper <= std::min(found.last.lower, t_max))) {
+        return false;
+    }
+    out.status = ContactStatus::will_touch;
+    out.rung = Rung::wide;
+    out.time = found.first.nearest;
+    out.time_lower = found.first.lower;
+    out.time_upper = found.first.upper;
+    out.last_time = std::min(found.last.nearest, t_max);
+    out.normal = first.edge.side == 0 ? found.normal : -found.normal;
+    if (contact_set) {
+        points[0] = found.place;
+        out.points = {points.data(), 1};
+    }
+    return true;
+}
+
+/// The same of all that is asked; false if it is not so simple.
+bool resolve_quickly(const Query& query, const Pair& bodies, FirstContact& out, std::array<Vec2, 2>& points) {
     const PolygonPair& pair = query.pair;
     if (query.relation != Relation::apart || query.entries.size() != 1 || query.exits.size() != 1) {
         return false;
@@ -497,32 +536,11 @@ bool resolve_quickly(const Query& query, FirstContact& out, std::array<Vec2, 2>&
     if (query.contact_set && lowest.vertex != lowest.neighbour) {
         return false;
     }
-    const auto facing = [&](AxisOf axis, std::size_t vertex) {
-        const PairedPolygon& p = pair.side(axis.side);
-        const bool is_a = axis.side == 0;
-        return Facing{p.ring[axis.index], p.ring[p.next(axis.index)], pair.other(axis.side).ring[vertex],
-                      is_a ? query.velocity_a : query.velocity_b, is_a ? query.velocity_b : query.velocity_a};
-    };
-    const Facing first = facing(entry, lowest.vertex);
-    const auto find = has_fused() ? find_moments_fused : find_moments_plain;
-    Moments found;
-    if (!find(first, facing(exit, pair.lowest(exit)), first.lowest, first.other_velocity, query.contact_set,
-              found) ||
-        !(found.first.upper <= std::min(found.last.lower, query.t_max))) {
-        return false;
-    }
-    out.status = ContactStatus::will_touch;
-    out.time = found.first.nearest;
-    out.time_lower = found.first.lower;
-    out.time_upper = found.first.upper;
-    out.last_time = std::min(found.last.nearest, query.t_max);
-    out.normal = entry.side == 0 ? found.normal : -found.normal;
-    if (query.contact_set) {
-        points[0] = found.place;
-        out.points = {points.data(), 1};
-    }
-    return true;
+    return resolve_quickly(bodies, {entry, lowest.vertex}, {exit, pair.lowest(exit)}, query.t_max,
+                           query.contact_set, out, points);
 }
+
+constexpr FirstContact kNever{ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN}, {}, true};
 
 }  // namespace
 
@@ -533,7 +551,6 @@ ExactFirstContactSolver::ExactFirstContactSolver(std::size_t largest_a, std::siz
 
 FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const MovingPolygon& b, double t_max,
                                             bool contact_set) {
-    constexpr FirstContact kNever{ContactStatus::never, kNaN, kNaN, kNaN, kNaN, {kNaN, kNaN}, {}, true};
     pair_.load(a.ring, b.ring);
     const Motion motion = relative_motion(a.velocity, b.velocity);
     Window window = window_of(pair_, motion, Slacks(pair_, motion).literal());
@@ -560,8 +577,9 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
 
     FirstContact result = kNever;
     const bool in_range = pair_.scale_exponent() == 0 && motion.scale_exponent == 0;
-    result.rung = Rung::wide;
-    if (in_range && resolve_quickly(query, result, points_)) {
+    if (in_range &&
+        resolve_quickly(query, {{pair_.side(0).ring, a.velocity}, {pair_.side(1).ring, b.velocity}}, result,
+                        points_)) {
         return result;
     }
     const Rung rung = climb(in_range, [&](auto arithmetic) {
@@ -573,6 +591,16 @@ FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const Moving
         result.points = overlap_.of(pair_, in_range, result.rung);
     }
     return result;
+}
+
+FirstContact ExactFirstContactSolver::solve(const MovingPolygon& a, const MovingPolygon& b, double t_max,
+                                            bool contact_set, const PolygonMotion& known) {
+    FirstContact result = kNever;
+    const bool certain =
+        known.verdict == PolygonMotion::Verdict::never ||
+        (known.verdict == PolygonMotion::Verdict::will_touch &&
+         resolve_quickly({a, b}, known.first, known.last, t_max, contact_set, result, points_));
+    return certain ? result : solve(a, b, t_max, contact_set);
 }
 
 }  // namespace geomsrv

@@ -30,6 +30,10 @@ public:
     /// Contact within [0, t_max], t_max >= 0 or infinite.  Without `contact_set` no points are found.
     FirstContact solve(const MovingPolygon& a, const MovingPolygon& b, double t_max, bool contact_set);
 
+    /// The same of a pair about which something is known beforehand (polygon_motion.hpp).
+    FirstContact solve(const MovingPolygon& a, const MovingPolygon& b, double t_max, bool contact_set,
+                       const PolygonMotion& known);
+
 private:
     PolygonPair pair_;
     ExactPolygonOverlap overlap_;

@@ -21,9 +21,6 @@ constexpr double kLargestReach = 0x1p200;
 // All pairs of axis and vertex are projected up to this many; beyond it supports are found by walking.
 constexpr std::size_t kLargestProduct = 1024;
 
-// Gain of height along an edge that is certainly not rounding: two relatively exact edges, products, sum.
-constexpr double kHeightError = 6.0 * kUnitRoundoff;
-
 constexpr std::size_t kLanes = Lanes::kCount;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

@@ -47,6 +47,9 @@ inline constexpr double kGapError = 14.0;
 /// long.
 inline constexpr double kWalkError = 40.0;
 
+/// Gain of height along an edge that is certainly not rounding: two relatively exact edges, products, sum.
+inline constexpr double kHeightError = 6.0 * kUnitRoundoff;
+
 /// Below 2^-1022 results are rounded to multiples of 2^-1074; no bound here counts more than 16 of them.
 inline constexpr double kPairUnderflow = 0x1p-1070;
 

@@ -31,6 +31,15 @@ inline constexpr double kLargestSlack = 0x1p-42;
 // rest covers the bound.
 inline constexpr double kRateError = 6.0 * kUnitRoundoff;
 
+// A gap and a rate known to this relative error make a time that is good enough as it is, 2^-45: about 50
+// times what rounding leaves of numbers in which nothing cancels.
+inline constexpr double kSharpTime = 0x1p-46;
+
+// Relative errors x, y of a gap and a rate below this make one of (1 + x) / (1 - y) - 1 < (x + y) (1 + 2^-19)
+// of their quotient; the second is for rounding of the bound, too.
+inline constexpr double kSmallShare = 0x1p-20;
+inline constexpr double kSecondOrderOfTime = 1.0 + 0x1p-18;
+
 /// Motion of b relative to a, in units of its own.
 struct Motion {
     Vec2 velocity;    ///< times 2^scale_exponent
