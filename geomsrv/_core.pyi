@@ -57,7 +57,8 @@ def first_contact_turning(
     t_max: float,
     tolerance: float,
     slack: _F,
-) -> tuple[_U, _F, _F, _F, _F, _B, _I]: ...
+    contact_set: bool = False,
+) -> tuple[_U, _F, _F, _F, _F, _B, _I, _F, _I]: ...
 def points_on_twist(
     ring: _F, twist: _F, points: _F, velocities: _F, t_max: float, tolerance: float
 ) -> tuple[_U, _F, _F, int]: ...

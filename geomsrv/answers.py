@@ -297,7 +297,8 @@ class FirstContacts(_Certified):
         First contact [s] and a proven interval, up to inf where contact is not proven; 0 if in contact at the start,
         NaN for NEVER and UNSUPPORTED.
     last_time : (n,) float64
-        Last contact [s], at most ``t_max``; inf if they never part, NaN for NEVER, UNSUPPORTED and bodies that turn.
+        Last contact [s], at most ``t_max``; inf if they never part, NaN for NEVER, UNSUPPORTED and bodies that turn,
+        which may part and meet again.
     normal : (n, d) float64
         Unit contact normal from a to b at ``time``; NaN where there is none.
     points : (k, d) float64, point_offsets : (n + 1,) int64

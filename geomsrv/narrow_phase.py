@@ -46,6 +46,7 @@ __all__ = [
     "placed_boxes",
     "placed_distances",
     "placed_hulls",
+    "point_sets",
     "polygon_contacts",
     "polygon_distances",
     "relative_poses",
@@ -426,7 +427,7 @@ def polygon_contacts(
         *rings, velocity_a, velocity_b, horizon, contact_set, tier
     )
     count_rungs(tier, rungs, counts)
-    sets = _sets(_in_space(points), offsets)
+    sets = point_sets(_in_space(points), offsets)
     return ContactRows(pairs, status, time, lower, upper, last, _in_space(normal), sets, certain)
 
 
@@ -449,12 +450,12 @@ def solid_contacts(
             side_a, side_b, velocity_a, velocity_b, horizon, contact_set, tier
         )
         count_rungs(tier, rungs, counts)
-        sets = _sets(points, offsets)
+        sets = point_sets(points, offsets)
         answered.append(ContactRows(here, status, time, lower, upper, last, normal, sets, certain))
     return ContactRows.joined(answered)
 
 
-def _sets(points: FloatArray, offsets: IntArray) -> NDArray[np.object_]:
+def point_sets(points: FloatArray, offsets: IntArray) -> NDArray[np.object_]:
     """(k,) the contact set of every row, or None."""
     sets = np.empty(len(offsets) - 1, dtype=object)
     for k in np.flatnonzero(np.diff(offsets)).tolist():

@@ -336,8 +336,11 @@ def first_contact(
         contacts, between which they may be apart.
 
         If anything turns, ``time`` is ``time_lower``: the bodies are proven apart before it, and proven in contact at
-        some time until ``time_upper``.  ``normal``, ``closing_speed``, and one contact point midway between the nearest
-        points, are those at ``time``; ``last_time`` is NaN.  TOUCHING, at the start, and GRAZING are outcomes where
+        some time until ``time_upper``.  ``normal``, ``points``, and ``closing_speed``, which is that midway between the
+        nearest points, are those at ``time``; ``last_time`` is NaN.  The contact set is what the bodies share to within
+        the way that they come nearer until ``time_upper``: a face that lies flat within that counts as flat, so a
+        smaller ``tolerance`` tells more apart; points are midway between the bodies.  At the start it is that of bodies
+        at rest.  TOUCHING, at the start, and GRAZING are outcomes where
         neither can be proven, with a ``time_upper`` that may be inf; NOT_CONVERGED is one where the work allowed did
         not get beyond ``time_lower``, as for two bodies that turn beside each other for ever.  ``cost.counts``: pairs
         decided in "filter" and "wide" arithmetic, and how many "looks" at them it took.

@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomsrv import _core, _validate
-from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray
+from geomsrv.answers import BoolArray, ContactStatus, Cost, FirstContacts, FloatArray, IntArray, gather
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.shapes import Boxes, Polygons, Polytopes
 
-__all__ = ["TIME_TOLERANCE", "approach", "first_contact_turning", "middles", "turns", "velocity_at"]
+__all__ = [
+    "TIME_TOLERANCE",
+    "approach",
+    "first_contact_turning",
+    "middles",
+    "settled_at_start",
+    "turns",
+    "velocity_at",
+]
 
 TIME_TOLERANCE = 1e-6  #: [s] widest interval of a contact, where no other is asked for
 
@@ -74,10 +82,11 @@ def first_contact_turning(
             motion[:, 3 * k : 3 * k + part.shape[1]] = part
         sides.append((_packed(body), motion))
     (body_a, motion_a), (body_b, motion_b) = sides
-    status, lower, upper, normal, point, wide, looks = _core.first_contact_turning(
-        body_a, body_b, motion_a, motion_b, end, step, np.zeros((1, 3))
+    found = _core.first_contact_turning(
+        body_a, body_b, motion_a, motion_b, end, step, np.zeros((1, 3)), bool(contact_set)
     )
-    found = ~np.isnan(point[:, 0]) if contact_set else np.zeros(count, np.bool_)
+    status, lower, upper, _, point, wide, looks, *_ = found
+    normal, points, offsets = settled_at_start((body_a, body_b), found, bool(contact_set))
     certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)
     counts = {
         "filter": int(np.count_nonzero(~wide)),
@@ -91,12 +100,63 @@ def first_contact_turning(
         time_upper=upper,
         last_time=np.full(count, np.nan),
         normal=np.ascontiguousarray(normal[:, :d]),
-        points=np.ascontiguousarray(point[found, :d]),
-        point_offsets=np.concatenate([[0], np.cumsum(found, dtype=np.int64)]),
+        points=np.ascontiguousarray(points[:, :d]),
+        point_offsets=offsets,
         certain=certain,
         _closing_speed=_closing_speed(lower, normal, point, motion_a, motion_b),
         cost=Cost(time.perf_counter_ns() - start, tier, counts),
     )
+
+
+def settled_at_start(
+    sides: tuple[tuple[Any, ...], tuple[Any, ...]],
+    found: tuple[Any, ...],
+    contact_set: bool,
+    sharp: BoolArray | None = None,
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Normals (n, 3), contact sets (k, 3) and offsets as found, but those of bodies at rest where contact is at once.
+
+    At rest bodies that come within rounding have a common plane.  Where they are found apart, and where they are not
+    ``sharp`` (n,) but have a radius, the point between them is all.
+    """
+    status, _, _, normal, point, _, _, points, offsets = found
+    at_once = (status == ContactStatus.TOUCHING) | ((status == ContactStatus.OVERLAPPING) & contact_set)
+    if not at_once.any():
+        return normal, points, offsets
+    rows = np.flatnonzero(at_once if sharp is None else at_once & sharp)
+    flat = len(sides[0]) == 2 and sides[0][0].shape[1] == 2
+    side_a, side_b = (_rows_of(side, rows) for side in sides)
+    shared, ends, across = np.zeros((0, 3)), np.zeros(1, np.int64), np.zeros((0, 3))
+    if len(rows):
+        still = np.zeros((1, 2 if flat else 3))
+        kernel: Any = _core.first_contact_polygons if flat else _core.first_contact_world
+        bodies = (*side_a, *side_b) if flat else (side_a, side_b)
+        _, _, _, _, _, across, shared, ends, *_ = kernel(*bodies, still, still, 0.0, contact_set, "float64")
+        shared, across = (np.pad(part, ((0, 0), (0, 3 - part.shape[1]))) for part in (shared, across))
+    touching = (status[rows] == ContactStatus.TOUCHING) & ~np.isnan(across[:, 0])
+    normal[rows[touching]] = across[touching]
+    if not contact_set:
+        return normal, points, offsets
+    # End to end: what was found, what bodies at rest share, and the points between.
+    sizes, first = np.diff(offsets), offsets[:-1].copy()
+    sizes[at_once] = ~np.isnan(point[at_once, 0])
+    first[at_once] = len(points) + len(shared) + np.flatnonzero(at_once)
+    held = np.diff(ends)
+    sizes[rows[held > 0]] = held[held > 0]
+    first[rows[held > 0]] = len(points) + ends[:-1][held > 0]
+    total = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)])
+    source = np.repeat(first - total[:-1], sizes) + np.arange(total[-1])
+    return normal, np.concatenate([points, shared, point])[source], total
+
+
+def _rows_of(side: tuple[Any, ...], rows: IntArray) -> tuple[Any, ...]:
+    """Some bodies of a side; one stands for all."""
+    single = len(side[0]) == 1 if len(side) == 3 else len(side[1]) == 2
+    if single:
+        return side
+    if len(side) == 3:
+        return tuple(np.ascontiguousarray(part[rows]) for part in side)
+    return gather(side[0], side[1], rows)
 
 
 def _closing_speed(

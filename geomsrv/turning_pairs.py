@@ -18,6 +18,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geomsrv import _core, _validate
 from geomsrv.advancement import advance
@@ -36,10 +37,11 @@ from geomsrv.narrow_phase import (
     near_at_rest,
     placed_boxes,
     placed_hulls,
+    point_sets,
     unpredictable,
 )
 from geomsrv.queries import MOVING, MOVING_POLYGONS, SOLID_MOTION_TIERS, TIERS
-from geomsrv.turning import TIME_TOLERANCE, approach, velocity_at
+from geomsrv.turning import TIME_TOLERANCE, approach, settled_at_start, velocity_at
 from geomsrv.world import ROUNDOFF, World
 
 __all__ = [
@@ -350,23 +352,22 @@ def followed_in_turning(world: World) -> BoolArray:
 
 def _turning_contacts(world: World, pairs: IntArray, question: Question) -> ContactRows:
     slack = _slack(world, pairs, question.margin)
-    status, lower, upper, normal, point = _ask(world, pairs, question, slack)
+    status, lower, upper, normal, points = _ask(world, pairs, question, slack)
     doubt = np.column_stack([world.uncertainty[pairs].sum(axis=1), world.velocity_uncertainty[pairs].sum(axis=1)])
     vague = np.flatnonzero(doubt.any(axis=1))
     time = lower.copy()
     if len(vague):
         slack[vague, 1:] += doubt[vague]
-        may, first, last, *_ = _ask(world, pairs[vague], question, slack[vague])
+        may, first, last, *_ = _ask(world, pairs[vague], replace(question, contact_set=False), slack[vague])
         never = status[vague] == ContactStatus.NEVER
         lower[vague] = np.where(never, first, np.fmin(first, lower[vague]))
         upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
     # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
     radius = radii(world)[pairs]
     uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
-    point[uneven] += 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
-    points = np.empty(len(pairs), dtype=object)
-    for k in np.flatnonzero(~np.isnan(point[:, 0])).tolist():
-        points[k] = point[k : k + 1]
+    shift = 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
+    for k, along in zip(uneven.tolist(), shift, strict=True):
+        points[k] = None if points[k] is None else points[k] + along
     certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)
     rows = ContactRows(pairs, status, time, lower, upper, np.full(len(pairs), np.nan), normal, points, certain)
     return rows.take((status != ContactStatus.NEVER) | ~np.isnan(lower))
@@ -374,21 +375,20 @@ def _turning_contacts(world: World, pairs: IntArray, question: Question) -> Cont
 
 def _ask(
     world: World, pairs: IntArray, question: Question, slack: FloatArray
-) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Status, lower, upper, normal and point from the engine."""
+) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, NDArray[np.object_]]:
+    """Status, lower, upper, normal and contact set, or None, from the engine."""
     count = len(pairs)
     status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
-    normal, point = np.zeros((count, 3)), np.zeros((count, 3))
+    normal, sets = np.zeros((count, 3)), np.empty(count, dtype=object)
     surfaces = meshes(world, pairs)
-    if surfaces.any():
-        answer = follow_meshes(
-            world, pairs[surfaces], question.horizon, question.tolerance, slack[surfaces], partial(_core_of, world)
-        )
-        status[surfaces], lower[surfaces], upper[surfaces], normal[surfaces], point[surfaces] = answer
     looked = _by_distance(world, pairs) & ~surfaces
-    if looked.any():
-        answer = advance(world, pairs[looked], question.horizon, question.tolerance, slack[looked])
-        status[looked], lower[looked], upper[looked], normal[looked], point[looked] = answer
+    for part, follow in ((surfaces, _follow_meshes), (looked, advance)):
+        if part.any():
+            answer = follow(world, pairs[part], question.horizon, question.tolerance, slack[part])
+            status[part], lower[part], upper[part], normal[part], point = answer
+            for k, at in zip(np.flatnonzero(part).tolist(), point, strict=True):
+                sets[k] = None if np.isnan(at[0]) else at[None]
+    radius = radii(world)
     planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
     motion = np.column_stack([world.twists, world.poses[:, :3]])
     motion[world.planar, 8] = 0.0
@@ -399,10 +399,28 @@ def _ask(
         side_a, side_b = (_side(world, pairs[part, k], flat, is_box[k]) for k in range(2))
         motion_a, motion_b = (np.ascontiguousarray(motion[pairs[part, k]]) for k in range(2))
         found = _core.first_contact_turning(
-            side_a, side_b, motion_a, motion_b, question.horizon, question.tolerance, slack[part]
+            side_a,
+            side_b,
+            motion_a,
+            motion_b,
+            question.horizon,
+            question.tolerance,
+            slack[part],
+            question.contact_set,
         )
-        status[part], lower[part], upper[part], normal[part], point[part] = found[:5]
-    return status, lower, upper, normal, point
+        status[part], lower[part], upper[part] = found[:3]
+        # Cores of round bodies share no surface.
+        sharp = ~radius[pairs[part]].any(axis=1)
+        normal[part], points, offsets = settled_at_start((side_a, side_b), found, question.contact_set, sharp)
+        sets[part] = point_sets(points, offsets)
+    return status, lower, upper, normal, sets
+
+
+def _follow_meshes(
+    world: World, pairs: IntArray, horizon: float, tolerance: float, slack: FloatArray
+) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The same of meshes, with one point each."""
+    return follow_meshes(world, pairs, horizon, tolerance, slack, partial(_core_of, world))
 
 
 def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatArray | IntArray, ...]:

@@ -3,8 +3,10 @@
 // First contact of bodies that translate and turn, pair by pair.
 #include "geom/turning.hpp"
 
+#include <cstring>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "bind/arrays.hpp"
 #include "bind/module.hpp"
@@ -83,7 +85,8 @@ private:
 };
 
 nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
-                                const Motions& motion_b, double t_max, double tolerance, const Rows3& slack) {
+                                const Motions& motion_b, double t_max, double tolerance, const Rows3& slack,
+                                bool contact_set) {
     const TurningSide a(bodies_a, motion_a);
     const TurningSide b(bodies_b, motion_b);
     const std::size_t count = a.size() == 1 ? b.size() : a.size();
@@ -94,12 +97,16 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
     const auto point = empty<double>({count, 3});
     const auto wide = empty<bool>({count});
     const auto looks = empty<std::int64_t>({count});
+    const auto offsets = empty<std::int64_t>({count + 1});
+    offsets.data[0] = 0;
+    std::vector<Vec3> shared;
     {
         const nb::gil_scoped_release unlocked;
         TurningSolver solver;
         for (std::size_t i = 0; i < count; ++i) {
             const double* row = slack.data() + 3 * (slack.shape(0) == 1 ? 0 : i);
-            const TurningContact found = solver.solve(a[i], b[i], t_max, tolerance, {row[0], row[1], row[2]});
+            const TurningContact found =
+                solver.solve(a[i], b[i], t_max, tolerance, {row[0], row[1], row[2]}, contact_set);
             status.data[i] = static_cast<std::uint8_t>(found.status);
             lower.data[i] = found.lower;
             upper.data[i] = found.upper;
@@ -110,10 +117,16 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
             }
             wide.data[i] = found.rung == Rung::wide;
             looks.data[i] = found.looks;
+            shared.insert(shared.end(), found.points.begin(), found.points.end());
+            offsets.data[i + 1] = static_cast<std::int64_t>(shared.size());
         }
     }
+    const auto points = empty<double>({shared.size(), 3});
+    if (!shared.empty()) {
+        std::memcpy(points.data, shared.data(), shared.size() * sizeof(Vec3));
+    }
     return nb::make_tuple(status.array, lower.array, upper.array, normal.array, point.array, wide.array,
-                          looks.array);
+                          looks.array, points.array, offsets.array);
 }
 
 }  // namespace
@@ -121,7 +134,7 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
 void define_turning(nb::module_& m) {
     m.def("first_contact_turning", first_contact_turning, nb::arg("a"), nb::arg("b"),
           nb::arg("motion_a").noconvert(), nb::arg("motion_b").noconvert(), nb::arg("t_max"),
-          nb::arg("tolerance"), nb::arg("slack").noconvert());
+          nb::arg("tolerance"), nb::arg("slack").noconvert(), nb::arg("contact_set") = false);
 }
 
 }  // namespace geomsrv::bind

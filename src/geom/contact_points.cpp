@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <tuple>
 
 #include "geom/convex_convex.hpp"
 #include "geom/lanes.hpp"
@@ -15,8 +14,6 @@
 namespace geomsrv {
 
 namespace {
-
-double component(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 /// A vertex of a body as given, rounded.
 Vec3 given_vertex(const ExactBody& body, int vertex) {
@@ -29,24 +26,6 @@ Vec3 given_vertex(const ExactBody& body, int vertex) {
         v = v + ((vertex >> i & 1) != 0 ? body.half[i] : -body.half[i]) * body.axis[i];
     }
     return v;
-}
-
-/// The part of an edge within a bound, by its ends' heights above it; false if nothing is left.
-bool clip_part(double from, double to, double slack, double& first, double& last) {
-    if (from <= slack && to <= slack) {
-        return true;
-    }
-    if (from > slack && to > slack) {
-        return false;
-    }
-    // One end is outside by more than the slack, the other is inside or near the bound.
-    const double crossing = std::clamp(from / (from - to), 0.0, 1.0);
-    if (from > to) {
-        first = std::max(first, crossing);
-    } else {
-        last = std::min(last, crossing);
-    }
-    return true;
 }
 
 /// What planes leave of an edge, and which of them end it.
@@ -112,11 +91,11 @@ GEOMSRV_WIDE_CLONES Span clip_edge(const std::vector<double> (&row)[6], Vec3 p, 
 void ContactPoints::collect(const Core& core, int listed, Vec3 normal, double slack, int body, Vec2 shift,
                             bool lowest) {
     const Vec3 n = lowest ? -normal : normal;
-    std::vector<Point>& out = face_[body];
+    std::vector<Point>& out = plane_.face_of(body);
     out.clear();
     const auto add = [&](int i) {
-        const Vec3 v = vertex_of(core, i);
-        out.push_back({component(v, axis_[0]) + shift.x, component(v, axis_[1]) + shift.y, body, i, i, 0.0});
+        const Vec2 v = plane_.flat(vertex_of(core, i));
+        out.push_back({v.x + shift.x, v.y + shift.y, body, i, i, 0.0});
     };
     if (core.points != nullptr) {
         heights_.resize(static_cast<std::size_t>(core.count));
@@ -148,102 +127,14 @@ void ContactPoints::collect(const Core& core, int listed, Vec3 normal, double sl
     }
 }
 
-bool ContactPoints::vertices_first(const Point& p, const Point& q) {
-    return std::make_tuple(p.from != p.to, p.body, p.from, p.to, p.part) <
-           std::make_tuple(q.from != q.to, q.body, q.from, q.to, q.part);
-}
-
-/// Leaves the corners of the hull, counter-clockwise; of points within the slack of one another, a vertex.
-void ContactPoints::hull(std::vector<Point>& points, double slack) {
-    std::sort(points.begin(), points.end(), vertices_first);
-    chain_.clear();
-    for (const Point& p : points) {
-        const bool known = std::any_of(chain_.begin(), chain_.end(), [&](const Point& q) {
-            return std::fabs(p.x - q.x) <= slack && std::fabs(p.y - q.y) <= slack;
-        });
-        if (!known) {
-            chain_.push_back(p);
-        }
-    }
-    std::swap(points, chain_);
-    if (points.size() < 3) {
-        return;
-    }
-    std::sort(points.begin(), points.end(),
-              [](const Point& p, const Point& q) { return std::tie(p.x, p.y) < std::tie(q.x, q.y); });
-    // Andrew's monotone chain: below from left to right, above from right to left.
-    chain_.clear();
-    for (const bool above : {false, true}) {
-        const std::size_t base = chain_.size();
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            const Point& p = points[above ? points.size() - 1 - k : k];
-            while (chain_.size() >= base + 2) {
-                const Point& q = chain_[chain_.size() - 1];
-                const Point& r = chain_[chain_.size() - 2];
-                const Vec2 chord = {p.x - r.x, p.y - r.y};
-                if (cross(Vec2{q.x - r.x, q.y - r.y}, chord) > slack * norm(chord)) {
-                    break;
-                }
-                chain_.pop_back();
-            }
-            chain_.push_back(p);
-        }
-        chain_.pop_back();
-    }
-    std::swap(points, chain_);
-}
-
-/// What bounds a polygon or a segment.
-void ContactPoints::sides_of(const std::vector<Point>& ring) {
-    sides_.clear();
-    const auto add = [&](Vec2 n, const Point& p) {
-        const double length = norm(n);
-        sides_.push_back({n.x / length, n.y / length, (n.x * p.x + n.y * p.y) / length});
-    };
-    for (std::size_t i = 0; i < ring.size(); ++i) {
-        const Point& p = ring[i];
-        const Point& q = ring[i + 1 == ring.size() ? 0 : i + 1];
-        const Vec2 along = {q.x - p.x, q.y - p.y};
-        add({along.y, -along.x}, p);
-        if (ring.size() == 2) {
-            add(along, q);
-        }
-    }
-}
-
-/// Adds the ends of what is left of the edges of a polygon or segment between the sides.
-void ContactPoints::clip(const std::vector<Point>& ring, double slack) {
-    const std::size_t edges = ring.size() == 2 ? 1 : ring.size();
-    for (std::size_t i = 0; i < edges; ++i) {
-        const Point& p = ring[i];
-        const Point& q = ring[i + 1 == ring.size() ? 0 : i + 1];
-        double first = 0.0;
-        double last = 1.0;
-        bool left = true;
-        for (const Side& side : sides_) {
-            const auto height = [&](const Point& at) {
-                return side.nx * at.x + side.ny * at.y - side.offset;
-            };
-            left = left && clip_part(height(p), height(q), slack, first, last);
-        }
-        const double length = norm(Vec2{q.x - p.x, q.y - p.y});
-        if (!left || (first - last) * length > slack) {
-            continue;
-        }
-        for (const double part : {std::min(first, last), std::max(first, last)}) {
-            const int from = part == 1.0 ? q.from : p.from;
-            const int to = part == 0.0 ? p.from : q.from;
-            found_.push_back({p.x + part * (q.x - p.x), p.y + part * (q.y - p.y), p.body, from, to, part});
-        }
-    }
-}
-
 /// Finds where two edges cross, if that is between their ends and not at a small angle.
 bool ContactPoints::cross_edges() {
-    const Point& p = face_[0][0];
-    const Point& q = face_[1][0];
-    const Vec2 e = {face_[0][1].x - p.x, face_[0][1].y - p.y};
-    const Vec2 f = {face_[1][1].x - q.x, face_[1][1].y - q.y};
+    const std::vector<Point>& edge = plane_.face_of(0);
+    const std::vector<Point>& other = plane_.face_of(1);
+    const Point& p = edge[0];
+    const Point& q = other[0];
+    const Vec2 e = {edge[1].x - p.x, edge[1].y - p.y};
+    const Vec2 f = {other[1].x - q.x, other[1].y - q.y};
     const Vec2 between = {q.x - p.x, q.y - p.y};
     const double turn = cross(e, f);
     const double on_e = cross(between, f) / turn;
@@ -252,7 +143,7 @@ bool ContactPoints::cross_edges() {
     if (!(clear && on_e > 0.0 && on_e < 1.0 && on_f > 0.0 && on_f < 1.0)) {
         return false;
     }
-    found_.assign(1, {p.x + on_e * e.x, p.y + on_e * e.y, 0, p.from, face_[0][1].from, on_e});
+    plane_.found().assign(1, {p.x + on_e * e.x, p.y + on_e * e.y, 0, p.from, edge[1].from, on_e});
     return true;
 }
 
@@ -269,25 +160,20 @@ Vec3 ContactPoints::world(const MovingPair& pair, const Point& point, double mom
 
 std::span<const Vec3> ContactPoints::touching(const MovingPair& pair, Vec3 normal, double moment,
                                               const ContactSlack& slack) {
-    // Along the largest component of the normal onto the plane of the other two, the right way round.
-    const double size[3] = {std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z)};
-    const int k = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-    axis_[0] = (k + 1) % 3;
-    axis_[1] = (k + 2) % 3;
-    if (component(normal, k) < 0.0) {
-        std::swap(axis_[0], axis_[1]);
-    }
+    plane_.face(normal);
     const Vec3 w = pair.velocity();
     const bool moved = moment > 0.0;
-    const Vec2 shift = {moved ? moment * component(w, axis_[0]) : 0.0,
-                        moved ? moment * component(w, axis_[1]) : 0.0};
-    found_.clear();
+    const Vec2 along = plane_.flat(w);
+    const Vec2 shift = {moved ? moment * along.x : 0.0, moved ? moment * along.y : 0.0};
+    std::vector<Point>& found = plane_.found();
+    found.clear();
     for (const int body : {0, 1}) {
         const MovingBody& given = body == 0 ? pair.given_a() : pair.given_b();
         collect(body == 0 ? pair.a() : pair.b(), given.body.count(), normal, slack.height, body,
                 body == 0 ? Vec2{} : shift, body == 1);
-        const Point first = face_[body].front();
-        const bool lone = std::all_of(face_[body].begin(), face_[body].end(), [&](const Point& p) {
+        const std::vector<Point>& face = plane_.face_of(body);
+        const Point first = face.front();
+        const bool lone = std::all_of(face.begin(), face.end(), [&](const Point& p) {
             return std::fabs(p.x - first.x) <= slack.place && std::fabs(p.y - first.y) <= slack.place;
         });
         if (lone) {
@@ -295,26 +181,23 @@ std::span<const Vec3> ContactPoints::touching(const MovingPair& pair, Vec3 norma
             return points_;
         }
     }
-    if (face_[0].size() == 2 && face_[1].size() == 2 && cross_edges()) {
-        points_.assign(1, world(pair, found_.front(), moment));
+    if (plane_.face_of(0).size() == 2 && plane_.face_of(1).size() == 2 && cross_edges()) {
+        points_.assign(1, world(pair, found.front(), moment));
         return points_;
     }
-    for (std::vector<Point>& face : face_) {
-        hull(face, slack.place);
+    for (const int body : {0, 1}) {
+        plane_.hull(plane_.face_of(body), slack.place);
     }
     // What misses by more than the slack, because its place is that much less certain, is sought with more.
     constexpr double kMoreSlack = 16.0;
     constexpr int kMostTries = 8;
     double nearness = slack.place;
-    for (int tries = 0; tries < kMostTries && found_.empty(); ++tries, nearness *= kMoreSlack) {
-        for (const int body : {0, 1}) {
-            sides_of(face_[1 - body]);
-            clip(face_[body], nearness);
-        }
-        hull(found_, nearness);
+    for (int tries = 0; tries < kMostTries && found.empty(); ++tries, nearness *= kMoreSlack) {
+        plane_.cross(nearness);
+        plane_.hull(found, nearness);
     }
     points_.clear();
-    for (const Point& point : found_) {
+    for (const Point& point : found) {
         points_.push_back(world(pair, point, moment));
     }
     return points_;
@@ -463,10 +346,12 @@ std::span<const Vec3> ContactPoints::overlapping(const MovingPair& pair, double 
     add_corners(pair, 0, slack);
     add_corners(pair, 1, slack);
     // A vertex ends several edges.
-    std::sort(corners_.begin(), corners_.end(),
-              [](const Corner& p, const Corner& q) { return vertices_first(q.point, p.point); });
+    std::sort(corners_.begin(), corners_.end(), [](const Corner& p, const Corner& q) {
+        return ContactPlane::vertices_first(q.point, p.point);
+    });
     const auto last = std::unique(corners_.begin(), corners_.end(), [](const Corner& p, const Corner& q) {
-        return !vertices_first(p.point, q.point) && !vertices_first(q.point, p.point);
+        return !ContactPlane::vertices_first(p.point, q.point) &&
+               !ContactPlane::vertices_first(q.point, p.point);
     });
     corners_.erase(last, corners_.end());
     // Points within the slack of the hull of the others go; crossings first.

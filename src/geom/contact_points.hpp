@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "geom/contact_plane.hpp"
 #include "geom/moving_pair.hpp"
 #include "geom/polytope_faces.hpp"
 #include "geom/vec.hpp"
@@ -37,16 +38,7 @@ public:
     std::span<const Vec3> overlapping(const MovingPair& pair, double slack);
 
 private:
-    /// On an edge of a body, or at a vertex of it if both ends are the same.
-    struct Point {
-        double x, y;  ///< in the plane of contact
-        int body;
-        int from, to;
-        double part;  ///< of the way from one to the other
-    };
-    struct Side {
-        double nx, ny, offset;  ///< nx x + ny y <= offset, unit normal
-    };
+    using Point = ContactPlane::Point;
 
     /// Planes that bound a body: unit outward normals and a point of each, by coordinates; padded to whole
     /// lanes by planes that nothing is outside of.
@@ -63,23 +55,15 @@ private:
     };
 
     void collect(const Core& core, int listed, Vec3 normal, double slack, int body, Vec2 shift, bool lowest);
-    static bool vertices_first(const Point& p, const Point& q);
-    void hull(std::vector<Point>& points, double slack);
     bool cross_edges();
-    void sides_of(const std::vector<Point>& ring);
-    void clip(const std::vector<Point>& ring, double slack);
     static void bounds_of(const Core& core, const PolytopeFaces& faces, Planes& out);
     void add_corners(const MovingPair& pair, int body, double slack);
     [[nodiscard]] bool stands_out(std::size_t corner, double slack) const;
     [[nodiscard]] bool is_in_hull_of_others(std::size_t corner, double reach, double slack);
     [[nodiscard]] Vec3 world(const MovingPair& pair, const Point& point, double moment) const;
 
-    int axis_[2] = {0, 1};
+    ContactPlane plane_;
     std::vector<double> heights_;
-    std::vector<Point> face_[2];
-    std::vector<Point> found_;
-    std::vector<Point> chain_;
-    std::vector<Side> sides_;
     PolytopeFaces faces_[2];
     Planes bounds_[2];
     std::vector<Vec3> outward_;  // of each vertex of a body

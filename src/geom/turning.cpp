@@ -82,6 +82,19 @@ constexpr double kCornerShares[] = {0x1p-36, 0x1p-26, 0x1p-16};
 constexpr Vec3 kCorners[] = {{1.0, 0.3, 0.2}, {-0.7, 0.8, 0.3}, {-0.4, -0.9, 0.4}, {0.1, -0.2, -1.0}};
 constexpr Vec3 kFlatCorners[] = {{1.0, 0.3, 0.0}, {-0.7, 0.8, 0.0}, {-0.4, -0.9, 0.0}};
 
+// What two bodies share when they touch is looked for where they are just before, to within the way that any
+// point of one comes as seen from the other until then, and what rounds: two vertices and two supports, each
+// as far off as is known of one height.
+constexpr double kBandRounding = 4.0;
+
+// What is found may be as far beyond an edge, seen along the normal, and there as far from the body.
+constexpr double kBandApart = 2.0;
+
+// A face may lean by as much as both bodies turn meanwhile, over no more than twice its reach; and where it
+// goes on beyond what touches, as far again or three times as far, it falls off by as many times the way.
+constexpr double kBandTurn = 2.0;
+constexpr double kBandLean = 4.0;
+
 Vec3 unit_or(Vec3 v, Vec3 other) { return norm(v) > 0.0 ? normalized(v) : other; }
 
 /// Whether two vectors certainly have the same length: the same coordinates but for order and sign.
@@ -487,6 +500,13 @@ bool TurningSolver::overlap_at(double t, Vec3 start, Look& at) {
     });
 }
 
+/// No point of b comes further, as seen from any of a, within a span of time.
+double TurningSolver::way(double span) const {
+    const double speed =
+        norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
+    return (speed * span) * (1.0 + kRateError);
+}
+
 /// Whether the origin certainly passes through a facet of the difference between the time of the look and t.
 bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
     const int count = planar_ ? 2 : 3;
@@ -509,29 +529,27 @@ bool TurningSolver::crossing(const Look& at, const Witness& feature, double t) {
         error = std::max(error, a_.body.wide_error(then.t) + b_.body.wide_error(then.t) + then.between_error +
                                     kWideHeightError * at.size + vague(then.t));
     }
-    const double speed =
-        norm(velocity_) + a_.body.speed() * a_.body.reach() + b_.body.speed() * b_.body.reach();
-    const double way = (speed * (t - at.t)) * (1.0 + kRateError) + error;  // of any vertex meanwhile
+    const double moved = way(t - at.t) + error;  // any vertex meanwhile
     Vec3 now[3];
     double furthest = 0.0;
     for (int i = 0; i < count; ++i) {
         now[i] = narrow(k[0][i]);
         furthest = std::max(furthest, norm(now[i]));
     }
-    furthest += way;
+    furthest += moved;
 
     // Weights of the foot of the origin, times |normal|^2, and how much they may change: products of `count`
     // factors more than the facet has, each no longer than twice the furthest.
     if (planar_) {
         const Vec3 e = now[1] - now[0];
-        const double doubt = 4.0 * furthest * way + kRateError * furthest * furthest;
+        const double doubt = 4.0 * furthest * moved + kRateError * furthest * furthest;
         if (!(dot(e, now[1]) > doubt && -dot(e, now[0]) > doubt)) {
             return false;
         }
     } else {
         const Vec3 normal = cross(now[1] - now[0], now[2] - now[0]);
         const double cube = furthest * furthest * furthest;
-        const double doubt = 16.0 * cube * way + 8.0 * kRateError * cube * furthest;
+        const double doubt = 16.0 * cube * moved + 8.0 * kRateError * cube * furthest;
         for (int i = 0; i < 3; ++i) {
             if (!(dot(normal, cross(now[(i + 1) % 3], now[(i + 2) % 3])) > doubt)) {
                 return false;
@@ -562,8 +580,8 @@ double TurningSolver::proven_contact(const Look& at, const Witness& feature, dou
     for (int i = 0;; ++i, ahead *= kFurtherAhead) {
         double t = i < kTries ? std::min(lower + ahead, last) : last;
         if (!(t < last) && late > 0) {
-            // Too late for the tolerance, but better than nothing.
-            t = std::min(lower + std::ldexp(tolerance, late), t_max);
+            // Too late for the tolerance, but better than nothing; a tolerance may be far less than an ulp.
+            t = std::min(lower + std::ldexp(std::max(tolerance, last - lower), late), t_max);
         }
         if (t > lower) {
             Look then;
@@ -582,8 +600,56 @@ Vec3 TurningSolver::in_world(Vec3 point, double t) const {
     return center_a_ + (t * velocity_a_ + down * point);
 }
 
+/// Across a feature of the difference, on the side of a normal that is less certain.
+Vec3 TurningSolver::normal_of(const Look& at, const Witness& feature, Vec3 normal) const {
+    const auto corner = [&](int i) {
+        return b_.body.placed(static_cast<std::size_t>(feature.b[i])) -
+               a_.body.placed(static_cast<std::size_t>(feature.a[i])) + at.between;
+    };
+    Vec3 n = normal;
+    if (feature.count == 2) {
+        const Vec3 e = corner(1) - corner(0);
+        n = normal - (dot(normal, e) / dot(e, e)) * e;
+    } else if (feature.count == 3) {
+        const Vec3 first = corner(0);
+        n = cross(corner(1) - first, corner(2) - first);
+    }
+    const double length = norm(n);
+    if (!(length > 0.0) || !(length < kInfinity)) {
+        return normal;
+    }
+    return (dot(n, normal) < 0.0 ? -1.0 / length : 1.0 / length) * n;
+}
+
+/// What the bodies share that are seen just before they touch, within a span of time in which their points
+/// come no further than `near`.
+void TurningSolver::find_points(const Look& at, const Witness& feature, Vec3 middle, double near, double span,
+                                TurningContact& out) {
+    ContactBand band{};
+    band.near = near;
+    band.apart = slack_.margin + kBandApart * near;
+    const double turned = kBandTurn * (a_.body.speed() + b_.body.speed()) * span;
+    band.wide[0] = kBandLean * near + turned * a_.body.reach();
+    band.wide[1] = kBandLean * near + turned * b_.body.reach();
+    const Vec3 normals[] = {out.normal, normal_of(at, feature, out.normal)};
+    const bool same =
+        normals[0].x == normals[1].x && normals[0].y == normals[1].y && normals[0].z == normals[1].z;
+    points_.clear();
+    for (const Vec3 point : contact_.between(at.a, at.b, {normals, same ? 1U : 2U}, middle, band)) {
+        points_.push_back(in_world(point, at.t));
+    }
+    if (planar_ && points_.size() == 2) {
+        // Counter-clockwise around a.
+        const Vec3 along = points_[1] - points_[0];
+        if (out.normal.x * along.y - out.normal.y * along.x < 0.0) {
+            std::swap(points_[0], points_[1]);
+        }
+    }
+    out.points = points_;
+}
+
 TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b, double t_max,
-                                     double tolerance, const TurningSlack& slack) {
+                                     double tolerance, const TurningSlack& slack, bool contact_set) {
     prepare(a, b, slack);
     looks_ = 0;
     const double end = std::min(t_max, end_of_period());
@@ -685,8 +751,13 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
                 const Vec3 predicted = unit_or(direction.normal + step * direction.change, direction.normal);
                 const Look then = look(next, predicted);
                 const bool seen = then.found.state == GjkState::apart && then.found.gap > 0.0;
-                // Where the bodies are too close to be told apart in doubles, what was seen last.
-                const Witness& w = seen ? then.found.witness : used;
+                const double span = (in_time ? upper : next_up(next)) - next;
+                const double moved = way(span) + kBandRounding * (then.error + kHeightError * then.size);
+                // Where the bodies are too close to be told apart in doubles, the feature that was seen last;
+                // and its point, too, should the nearest ones be lost.
+                const Witness& feature_then = seen ? then.found.witness : used;
+                const bool lost = !seen && !(then.found.length <= slack_.margin + moved);
+                const Witness& w = lost ? used : then.found.witness;
                 Vec3 middle;
                 for (int i = 0; i < w.count; ++i) {
                     const Vec3 p = a_.body.placed(static_cast<std::size_t>(w.a[i]));
@@ -695,6 +766,9 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
                 }
                 out.point = in_world(middle, next);
                 out.normal = seen ? then.found.normal : predicted;
+                if (contact_set && out.status != TurningStatus::touching) {
+                    find_points(then, feature_then, middle, moved, span, out);
+                }
                 return out;
             }
         }
@@ -706,8 +780,8 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
 }
 
 TurningContact TurningSolver::solve(const TurningBody& a, const TurningBody& b, double t_max,
-                                    double tolerance, const TurningSlack& slack) {
-    TurningContact out = search(a, b, t_max, tolerance, slack);
+                                    double tolerance, const TurningSlack& slack, bool contact_set) {
+    TurningContact out = search(a, b, t_max, tolerance, slack, contact_set);
     out.looks = looks_;
     return out;
 }

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "geom/gjk.hpp"
+#include "geom/placed_contact_points.hpp"
 #include "geom/rung.hpp"
 #include "geom/turning_place.hpp"
 #include "geom/vec.hpp"
@@ -36,6 +38,9 @@ struct TurningContact {
     double upper = 0.0;  ///< [s]; infinite where no contact is proven
     Vec3 normal;         ///< unit, from a to b, at `lower`; NaN where there is none
     Vec3 point;  ///< between the nearest points at `lower`; of overlapping bodies a common one; or NaN
+    /// If asked for, and contact is later than at t = 0, what may be shared by `upper`: a point, the ends of
+    /// a segment, or a polygon's corners, counter-clockwise about the normal.  Valid until the next call.
+    std::span<const Vec3> points;
     Rung rung = Rung::filter;
     int looks = 0;  ///< how often the bodies were looked at
 };
@@ -46,7 +51,7 @@ public:
     /// Contact within [0, t_max], t_max >= 0 or infinite, to `tolerance` > 0 [s]; for all bodies that the
     /// slack allows.
     TurningContact solve(const TurningBody& a, const TurningBody& b, double t_max, double tolerance,
-                         const TurningSlack& slack = {});
+                         const TurningSlack& slack = {}, bool contact_set = false);
 
 private:
     struct Side {
@@ -59,7 +64,7 @@ private:
     struct Direction;  // along which they are apart, and how it turns
 
     TurningContact search(const TurningBody& a, const TurningBody& b, double t_max, double tolerance,
-                          const TurningSlack& slack);
+                          const TurningSlack& slack, bool contact_set);
     void prepare(const TurningBody& a, const TurningBody& b, const TurningSlack& slack);
     double end_of_period() const;
     Look look(double t, Vec3 start);
@@ -74,6 +79,10 @@ private:
     bool crossing(const Look& at, const Witness& feature, double t);
     double proven_contact(const Look& at, const Witness& feature, double step, double expected, double t_max,
                           double tolerance);
+    void find_points(const Look& at, const Witness& feature, Vec3 middle, double near, double span,
+                     TurningContact& out);
+    Vec3 normal_of(const Look& at, const Witness& feature, Vec3 normal) const;
+    double way(double span) const;
     double vague(double t) const { return slack_.uncertainty + slack_.drift * t; }
     Vec3 in_world(Vec3 point, double t) const;
 
@@ -85,6 +94,8 @@ private:
     TurningSlack slack_;
     int looks_ = 0;  // at this pair
     Vec3 center_a_, velocity_a_;
+    PlacedContactPoints contact_;
+    std::vector<Vec3> points_;
 };
 
 }  // namespace geomsrv
