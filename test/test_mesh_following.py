@@ -168,6 +168,42 @@ def test_a_mesh_that_is_not_convex(rng: np.random.Generator, margin: float) -> N
     assert met >= 6 and earlier >= 6, (met, earlier)
 
 
+@pytest.mark.parametrize("margin", [0.0, 0.05])
+@pytest.mark.parametrize("uncertainty", [0.0, 0.01])
+def test_no_triangle_is_left_out(rng: np.random.Generator, margin: float, uncertainty: float) -> None:
+    """A loose heap of triangles meets what the first of them meets, each being an object of its own."""
+    seen: Counter[int] = Counter()
+    for _ in range(2):
+        points = rng.uniform(-0.8, 0.8, (6, 1, 3)) + rng.normal(size=(6, 3, 3)) * 0.15
+        heap = gs.Mesh(points.reshape(-1, 3), np.arange(18).reshape(-1, 3))
+        for name, shape in others(rng).items():
+            shape = gs.Mesh(points[:2].reshape(-1, 3), np.arange(6).reshape(-1, 3)) if name == "mesh" else shape
+            mesh, other = moving(rng, "m", heap, uncertainty=uncertainty), moving(rng, "o", shape)
+            alone = [gs.Triangle(*p) for p in points]
+            parts = [gs.Triangle(*p) for p in points[:2]] if name == "mesh" else [shape]
+            found = [
+                contact(
+                    gs.SceneObject("m", one, mesh.pose, mesh.twist, uncertainty=uncertainty),
+                    gs.SceneObject("o", part, other.pose, other.twist),
+                    margin=margin,
+                )
+                for one in alone
+                for part in parts
+            ]
+            status, lower, upper = contact(mesh, other, margin=margin)
+            seen[status] += 1
+            told = f"{name}: {status} [{lower}, {upper}] but {sorted(found, key=str)}"
+            assert (status == NEVER) == all(how == NEVER for how, *_ in found), told
+            assert (status in AT_ONCE) == any(how in AT_ONCE for how, *_ in found), told
+            low, high = (np.fmin.reduce([row[k] for row in found]) for k in (1, 2))
+            if np.isnan(low):
+                assert np.isnan(lower), told
+                continue
+            assert low - 1e-6 <= lower <= low + 1e-6 and lower <= high and low <= upper, told
+            assert uncertainty or upper <= high + 1e-6, told
+    assert seen[WILL_TOUCH] >= 5 and seen[NEVER] >= 1, seen
+
+
 @pytest.mark.parametrize("name", ["box", "sphere", "cylinder", "mesh"])
 def test_uncertain_meshes_cover_all_that_may_be(rng: np.random.Generator, name: str) -> None:
     """Whatever is tried within the uncertainty, and in velocity, comes within the interval."""
