@@ -32,6 +32,9 @@ SAME_TIME = 0.25
 # Pairs of pieces that are followed for the sake of the latest possible contact, where that is far from the earliest.
 MOST_PIECES = 256
 
+# Pairs of pieces that are looked at where some touch at the start, to see whether others overlap.
+MOST_TOUCHING = 8192
+
 __all__ = ["Answer", "follow_meshes", "meshes"]
 
 Answer = tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]  #: status, lower, upper, normal, point
@@ -209,22 +212,26 @@ def _first(q: _Question) -> _Row:
         if deep:
             return -np.inf
         latest = min(high - SAME_TIME * q.tolerance, q.end)
+        if low == 0.0:  # and perhaps deep, elsewhere
+            return max(latest, 0.0) if looked < MOST_PIECES else 0.0 if looked < MOST_TOUCHING else -np.inf
         return latest if looked < MOST_PIECES else min(low - SAME_TIME * q.tolerance, latest)
+
+    def until() -> float:
+        # What meets later than a proven contact need not be followed.
+        return 0.0 if low == 0.0 and looked >= MOST_PIECES else min(high, q.end)
 
     def begin(nodes_a: IntArray, nodes_b: IntArray) -> FloatArray:
         if not len(nodes_a):
             return np.zeros(0)
-        return q.earliest(nodes_a, nodes_b, min(high, q.end))
+        return q.earliest(nodes_a, nodes_b, until())
 
     def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
         nonlocal low, high, deep, looked
-        # What meets later than a proven contact need not be followed.
-        end = min(high, q.end)
         if curved:
             mesh, pieces = (q.a, pieces_a) if q.a.mesh is not None else (q.b, pieces_b)
-            answer = q.by_distance(mesh.corners(pieces), end)
+            answer = q.by_distance(mesh.corners(pieces), until())
         else:
-            answer = q.engine(q.a.pieces(pieces_a), q.b.pieces(pieces_b), end)
+            answer = q.engine(q.a.pieces(pieces_a), q.b.pieces(pieces_b), until())
         found.append(answer)
         met = answer[0] != ContactStatus.NEVER
         low = float(np.fmax(answer[1], 0.0)[met].min(initial=low))
