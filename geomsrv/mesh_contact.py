@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
 
 __all__ = ["common_plane", "united_in_space"]
@@ -40,8 +41,9 @@ def common_plane(
     faces = [np.cross(t[1] - t[0], t[2] - t[0]) for t in triangles]
     lengths = [float(np.linalg.norm(n)) for n in faces]
     units = [n / length for n, length in zip(faces, lengths, strict=True) if length > 0.0]
-    given = normals[~np.isnan(normals[:, 0])]
-    candidates = np.concatenate([given, *(np.stack([n, -n]) for n in units)])
+    given = _distinct(normals[~np.isnan(normals[:, 0])])
+    both = np.array([sign * n for n in units for sign in (1.0, -1.0)]).reshape(-1, 3)
+    candidates = np.concatenate([given, _distinct(both)])
     apart = np.ones(len(candidates), np.bool_)
     for (below, above), place in zip(pairs, places, strict=True):
         apart &= ((below - place) @ candidates.T).max(axis=0) <= slack
@@ -54,6 +56,11 @@ def common_plane(
     # That of a pair is correctly rounded, or nearly so.
     same = exact[(np.abs(exact - best) <= NORMAL_SLACK).all(axis=1)]
     return 0.0 + (same[0] if len(same) else best)  # without -0.0
+
+
+def _distinct(rows: FloatArray) -> FloatArray:
+    """Each row once, where it comes first."""
+    return rows[np.sort(np.unique(rows, axis=0, return_index=True)[1])]
 
 
 def united_in_space(sets: Sequence[FloatArray], slack: float, normal: FloatArray) -> list[FloatArray]:
@@ -200,8 +207,11 @@ def _around(plane: _Plane, slack: float) -> Iterator[FloatArray]:
     lines = np.unique(np.sort(edges, axis=1), axis=0)
     middles = 0.5 * (places[lines[:, 0]] + places[lines[:, 1]])
     covered = np.zeros(len(lines), np.bool_)
-    for ring in rings:
-        covered |= (plane.heights(ring, middles) > slack).all(axis=1)
+    corners = places[: ends[-1]]
+    low, high = (extreme.reduceat(corners, ends[:-1], axis=0) for extreme in (np.minimum, np.maximum))
+    inner, line = _boxes_that_meet(low, high, middles, middles)
+    for ring, here in zip(rings, np.split(line, np.searchsorted(inner, np.arange(1, len(rings)))), strict=True):
+        covered[here] |= (plane.heights(ring, middles[here]) > slack).all(axis=1)
     border = []
     for (u, v), inside in zip(lines.tolist(), covered.tolist(), strict=True):
         left, right = (u, v) in known, (v, u) in known
@@ -215,26 +225,35 @@ def _around(plane: _Plane, slack: float) -> Iterator[FloatArray]:
 
 def _same(places: FloatArray, slack: float) -> IntArray:
     """For every place the first one that is the same."""
-    close = (np.abs(places[:, None] - places[None]) <= slack).all(axis=2)
-    first: IntArray = np.argmax(close, axis=1)
+    one, two = _boxes_that_meet(places - slack, places + slack, places, places)
+    close = (np.abs(places[one] - places[two]) <= slack).all(axis=1)
+    first: IntArray = np.full(len(places), len(places))
+    np.minimum.at(first, one[close], two[close])
     return first[first]
 
 
 def _crossings(places: FloatArray, edges: IntArray, points: FloatArray, slack: float) -> tuple[FloatArray, FloatArray]:
     """Where edges cross each other that end elsewhere."""
     start, way = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
-    length = np.linalg.norm(way, axis=1)
-    unit = way / length[:, None]
-    from_start = unit[:, None, 0] * (start[None, :, 1] - start[:, None, 1]) - unit[:, None, 1] * (
-        start[None, :, 0] - start[:, None, 0]
-    )
+    unit = way / np.linalg.norm(way, axis=1)[:, None]
     end = start + way
-    from_end = unit[:, None, 0] * (end[None, :, 1] - start[:, None, 1]) - unit[:, None, 1] * (
-        end[None, :, 0] - start[:, None, 0]
-    )
-    apart = (from_start > slack) & (from_end < -slack) | (from_start < -slack) & (from_end > slack)
-    one, two = np.nonzero(np.triu(apart & apart.T))
-    part = from_start[one, two] / (from_start[one, two] - from_end[one, two])
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    one, two = _boxes_that_meet(low, high, low, high)
+    one, two = one[one < two], two[one < two]
+
+    def height(line: IntArray, at: FloatArray) -> FloatArray:
+        off: FloatArray = unit[line, 0] * (at[:, 1] - start[line, 1]) - unit[line, 1] * (at[:, 0] - start[line, 0])
+        return off
+
+    def ends_apart(line: IntArray, other: IntArray) -> BoolArray:
+        from_start, from_end = height(line, start[other]), height(line, end[other])
+        apart: BoolArray = (from_start > slack) & (from_end < -slack) | (from_start < -slack) & (from_end > slack)
+        return apart
+
+    crossing = ends_apart(one, two) & ends_apart(two, one)
+    one, two = one[crossing], two[crossing]
+    from_start, from_end = height(one, start[two]), height(one, end[two])
+    part = from_start / (from_start - from_end)
     at = points[edges[two, 0]] + part[:, None] * (points[edges[two, 1]] - points[edges[two, 0]])
     return start[two] + part[:, None] * way[two], at
 
@@ -244,16 +263,31 @@ def _split(places: FloatArray, edges: IntArray, corners: IntArray, slack: float)
     start, way = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
     length = np.linalg.norm(way, axis=1)
     unit = way / length[:, None]
-    arms = places[corners][None] - start[:, None]
-    along = (arms * unit[:, None]).sum(axis=2)
-    across = unit[:, None, 0] * arms[:, :, 1] - unit[:, None, 1] * arms[:, :, 0]
-    on = (np.abs(across) <= slack) & (along > slack) & (along < length[:, None] - slack)
+    end, at = start + way, places[corners]
+    room = PLANE_REACH * slack  # for a point beside an edge, and for rounding
+    edge, corner = _boxes_that_meet(np.minimum(start, end) - room, np.maximum(start, end) + room, at, at)
+    arms = at[corner] - start[edge]
+    along = (arms * unit[edge]).sum(axis=1)
+    across = unit[edge, 0] * arms[:, 1] - unit[edge, 1] * arms[:, 0]
+    on = (np.abs(across) <= slack) & (along > slack) & (along < length[edge] - slack)
+    edge, corner, along = edge[on], corner[on], along[on]
+    order = np.lexsort((corner, along, edge))
+    between = np.split(corners[corner[order]], np.searchsorted(edge[order], np.arange(1, len(edges))))
     cut = []
-    for k, (u, v) in enumerate(edges.tolist()):
-        between = np.flatnonzero(on[k])
-        stops = [u, *corners[between[np.argsort(along[k, between])]].tolist(), v]
-        cut += [(x, y) for x, y in zip(stops[:-1], stops[1:], strict=True) if x != y]
+    for (u, v), stops in zip(edges.tolist(), between, strict=True):
+        ring = [u, *stops.tolist(), v]
+        cut += [(x, y) for x, y in zip(ring[:-1], ring[1:], strict=True) if x != y]
     return np.array(cut, np.int64).reshape(-1, 2)
+
+
+def _boxes_that_meet(
+    low_a: FloatArray, high_a: FloatArray, low_b: FloatArray, high_b: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Pairs of rectangles (n, 2) and (m, 2) that meet, sorted."""
+    flat = [np.column_stack([corner, np.zeros(len(corner))]) for corner in (low_a, high_a, low_b, high_b)]
+    found = _core.overlapping_pairs_between(*flat)
+    found = found[np.lexsort((found[:, 1], found[:, 0]))]
+    return found[:, 0], found[:, 1]
 
 
 def _chains(border: Sequence[tuple[int, int]], places: FloatArray) -> Iterator[list[int]]:
