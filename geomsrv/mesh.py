@@ -69,7 +69,9 @@ def first_contact_meshes(
         ways = moving[0][i], moving[1][i]
         if turning:
             options |= {name: values[i] for name, values in about.items()}
-        rows.append((_first_turning if turning else _first)(_Question(ask, bodies, i, ways, end, options, counts)))
+        rows.append(
+            (_first_turning if turning else _first)(_Question(ask, bodies, i, ways, end, options, counts, wanted))
+        )
     points, point_offsets, part_offsets = sets_end_to_end((row.parts if wanted else [] for row in rows), 3)
     numbers = np.array([row.numbers for row in rows]).reshape(-1, 4)
     normal = np.array([row.normal for row in rows]).reshape(-1, 3)
@@ -191,6 +193,7 @@ class _Question(NamedTuple):
     end: float  #: of the time window
     options: dict[str, Any]  #: of `ask`
     counts: Counter[str]  #: of all items
+    wanted: bool  #: the contact set
 
     def batches(self, pieces: Iterable[IntArray]) -> Iterator[Boxes | Polytopes]:
         """Listed pieces of a, and of b."""
@@ -260,7 +263,8 @@ def _first(q: _Question) -> _Row:
         row.normal = common_plane(
             near, np.array([part[0] for part in sets]), found.column("normal")[tied], velocity, slack
         )
-    row.parts = [np.ldexp(part, unit) for part in united_in_space(sets, slack, row.normal)]
+    if q.wanted:
+        row.parts = [np.ldexp(part, unit) for part in united_in_space(sets, slack, row.normal)]
     if row.status == ContactStatus.TOUCHING and len(tied) > 1 and np.isnan(row.normal[0]):
         row.certain = False  # none may pass through the other, and both together do
     return row

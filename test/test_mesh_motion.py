@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections import Counter
 from fractions import Fraction
 from typing import Any
@@ -471,6 +472,26 @@ def test_turning_meshes_meet_as_their_triangles_do(rng: np.random.Generator) -> 
         assert shell.time[0] <= math.atan2(0.9, 1.6) - math.asin(0.1 / math.hypot(0.9, 1.6)) <= shell.time_upper[0]
     with pytest.raises(gs.NotAvailableError, match="accuracy='exact' is not available for bodies that turn"):
         gs.first_contact(bar, post, (0, 0, 0), (0, 0, 0), angular_velocity_a=(0, 0, 1), accuracy="exact")
+
+
+def test_a_fine_plate_lands_flat() -> None:
+    """One square of 1,250 triangles, in memory that grows with them and not with their square."""
+    n = 25
+    x = np.linspace(-1, 1, n + 1)
+    at_ = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    low, right, up, both = at_[:-1, :-1].ravel(), at_[1:, :-1].ravel(), at_[:-1, 1:].ravel(), at_[1:, 1:].ravel()
+    flat = np.concatenate([np.stack([low, right, both], axis=1), np.stack([low, both, up], axis=1)])
+    plate = gs.Mesh([(a, b, 1.0) for a in x for b in x], flat)
+    table = gs.Boxes.from_poses([[0, 0, -1, 0, 0, 0, 1]], [[2.0, 2.0, 1.0]])
+    tracemalloc.start()
+    answer = gs.first_contact(plate, table, (0, 0, -1), (0, 0, 0))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert answer.time.tolist() == [1.0] and answer.normal.tolist() == [[0, 0, -1]]
+    assert sorted(answer.points.tolist()) == [[-1, -1, 0], [-1, 1, 0], [1, -1, 0], [1, 1, 0]]
+    assert peak < 100e6, f"{peak / 1e6:.0f} MB"
+    bare = gs.first_contact(plate, table, (0, 0, -1), (0, 0, 0), contact_set=False)
+    assert len(bare.points) == 0 and (bare.time, bare.normal.tolist()) == (answer.time, answer.normal.tolist())
 
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
