@@ -386,6 +386,18 @@ FirstContact FirstContactSolver::solve(const MovingPolygon& a, const MovingPolyg
                     known.normal,
                     {points_.data(), contact_set ? 1U : 0U},
                     true};
+        case PolygonMotion::Verdict::overlapping: {
+            FirstContact result{ContactStatus::overlapping,       0.0,          0.0, 0.0,
+                                std::min(known.last_time, t_max), {kNaN, kNaN}, {},  true};
+            if (contact_set) {
+                pair_.place(a.ring, b.ring);
+                result.points = overlap_.of(pair_, Slacks(pair_, {}).heights());
+            }
+            if (!contact_set || !result.points.empty()) {
+                return result;
+            }
+            break;
+        }
     }
     return solve(a, b, t_max, contact_set);
 }

@@ -27,19 +27,19 @@ namespace geomsrv {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr std::size_t kLanes = Lanes::kCount;
 
-// Lengths and speeds between these need no scale, and products of four stay in the normal range; 0 is a
-// speed, too.
-constexpr double kSmallestPlain = 0x1p-200;
-constexpr double kLargestPlain = 0x1p200;
+// Lengths and speeds between these need no scale; 0 is a speed, too.  Two edges whose product is larger than
+// the least turn, as no edge is longer than twice the reach, are long enough for all slacks to be normal
+// numbers, next to which no underflow counts.
+constexpr double kSmallestPlain = 0x1p-100;
+constexpr double kLargestPlain = 0x1p100;
+constexpr double kLeastTurn = 0x1p-300;
 
 // Slack for the rounding of the input is no larger than kLargestSlack of |D|_1 times the reach or the speed;
 // a sixteenth more covers what rounds here, kGapError and kRateError, which are less than a hundredth of it.
 constexpr double kMostSlack = 1.0625 * kLargestSlack;
-
-// Edges are long enough for no product with a length or a speed to underflow.
-constexpr double kShortestEdge = 0x1p-400;
 
 struct LaneVec2 {
     Lanes x, y;
@@ -73,7 +73,7 @@ struct LanePolygons {
     std::size_t most = 0;         ///< vertices of the largest
     Lanes count;                  ///< of each
     Lanes reach;                  ///< largest |local coordinate|
-    LaneMask strict;              ///< every turn is certainly to the left, and no edge is too short
+    LaneMask strict;              ///< every turn is certainly to the left, and large enough
     LaneVec2 vertex[kMostSides];  ///< local
     LaneVec2 normal[kMostSides];  ///< outward, of the edge that starts at a vertex
     Lanes gap[kMostSides];        ///< along it
@@ -102,8 +102,7 @@ GEOMSRV_INLINE void place(LanePolygons& p, const Vec2 (&origin)[kLanes]) {
                                const LaneVec2& behind) __attribute__((always_inline)) {
         const Lanes left = before.x * behind.y;
         const Lanes right = before.y * behind.x;
-        return Lanes(kCrossError) * (magnitude(left) + magnitude(right)) + Lanes(kCrossUnderflow) <
-               left - right;
+        return Lanes(kCrossError) * (magnitude(left) + magnitude(right)) + Lanes(kLeastTurn) < left - right;
     };
     LaneVec2 here = given(0);
     LaneVec2 before = {none, none};
@@ -115,7 +114,6 @@ GEOMSRV_INLINE void place(LanePolygons& p, const Vec2 (&origin)[kLanes]) {
         p.vertex[i] = local;
         p.normal[i] = normal;
         const LaneMask beyond = p.count <= Lanes(static_cast<double>(i));
-        p.strict = p.strict & (beyond | (Lanes(kShortestEdge) < size_of(normal)));
         if (i > 0) p.strict = p.strict & (beyond | turns_left(before, normal));
         before = {select(beyond, before.x, normal.x), select(beyond, before.y, normal.y)};
         here = next;
@@ -327,56 +325,63 @@ GEOMSRV_WIDE_CLONES void decide_four(const Four& pairs, double t_max, bool last_
     // As window_of().
     const Lanes gap_slack = Lanes(kMostSlack) * reach;
     const Lanes rate_slack = Lanes(kMostSlack) * speed;
-    Lanes enter = none;
+    Lanes enter = none;  // > 0 where they are apart and approach along some axis
     Lanes leave = kInfinity;
-    LaneMask apart = none < none;
-    LaneMask parting = apart;
+    Lanes shallowest = -kInfinity;
     for (const int side : {0, 1}) {
         LanePolygons& q = p[side];
         const LaneVec2 toward = side == 0 ? LaneVec2{-velocity.x, -velocity.y} : velocity;
         for (std::size_t k = 0; k < q.most; ++k) {
             const Lanes size = size_of(q.normal[k]);
             const Lanes rate = dot(q.normal[k], toward);
-            const Lanes open = q.gap[k] - gap_slack * size;
-            const Lanes closing = rate + rate_slack * size;
+            const Lanes gap_off = gap_slack * size;
+            const Lanes rate_off = rate_slack * size;
+            const Lanes open = q.gap[k] - gap_off;
+            const Lanes closing = rate + rate_off;
+            const Lanes most = q.gap[k] + gap_off;
             const Lanes time = open / closing;
-            const LaneMask is_apart = none < open;
-            const LaneMask may_close = none < closing;
-            apart = apart | is_apart;
-            parting = parting | (is_apart & ~may_close);
-            enter = greater(enter, kept(is_apart & may_close, time));
+            // Apart and parting: the time is < 0, so they leave before they enter.  At rest it is infinite.
+            enter = greater(enter, kept(none < open, time));
             leave = lesser(leave, select(closing < none, time, Lanes(kInfinity)));
-            q.most_gap[k] = q.gap[k] + gap_slack * size;
-            q.slowest[k] = rate - rate_slack * size;
+            shallowest = greater(shallowest, most + gap_off);
+            q.most_gap[k] = most;
+            q.slowest[k] = rate - rate_off;
             q.fastest[k] = closing;
         }
     }
-    const LaneMask never = ordinary & (parting | (leave < enter) | (Lanes(t_max) < enter));
+    const LaneMask never = ordinary & ((leave < enter) | (lesser(Lanes(t_max), Lanes(kLargest)) < enter));
+    // Tips are no more than sqrt(2) times as sensitive to slack as the edges beside them, so what is inside
+    // of all edges by twice the slack is inside of tips.
+    const LaneMask deep = shallowest < none;
 
-    // As candidates_of(): which axes may set the first and the last contact, and how many.
+    // As candidates_of(): which axes may set the first and the last contact, as a sum that tells the axis if
+    // there is one only.
+    constexpr double kOne = 2.0 * kMostSides;
     Lanes entries = none;
     Lanes exits = none;
-    Lanes entry = none;
-    Lanes exit = none;
     for (const int side : {0, 1}) {
         const LanePolygons& q = p[side];
-        const double first = side == 0 ? 0.0 : static_cast<double>(kMostSides);
+        const double first = kOne + (side == 0 ? 0.0 : static_cast<double>(kMostSides));
         for (std::size_t k = 0; k < q.most; ++k) {
             const Lanes number = first + static_cast<double>(k);
             const LaneMask begins = (none < q.most_gap[k]) & (enter * q.slowest[k] <= q.most_gap[k]);
             const LaneMask ends = (q.fastest[k] < none) & (leave * q.slowest[k] <= q.most_gap[k]);
-            entries = entries + kept(begins, Lanes(1.0));
-            exits = exits + kept(ends, Lanes(1.0));
-            entry = select(begins, number, entry);
-            exit = select(ends, number, exit);
+            entries = entries + kept(begins, number);
+            exits = exits + kept(ends, number);
         }
     }
-    LaneMask clear = ordinary & apart & ~never & (entries <= Lanes(1.0)) & (Lanes(1.0) <= entries) &
-                     (exits <= Lanes(1.0)) & (Lanes(1.0) <= exits);
+    const auto is_one = [](const Lanes& sum) __attribute__((always_inline)) {
+        return (Lanes(kOne) <= sum) & (sum < Lanes(2.0 * kOne));
+    };
+    const LaneMask one_exit = is_one(exits);
+    LaneMask clear = ordinary & (none < enter) & ~never & is_one(entries) & one_exit;
+    const Lanes entry = kept(is_one(entries), entries - Lanes(kOne));
+    const Lanes exit = kept(one_exit, exits - Lanes(kOne));
 
     const LaneAxis begin = axis_of(p, entry, velocity, reach);
     const LaneAxis end = axis_of(p, exit, velocity, reach);
     clear = clear & begin.is_sharp() & end.is_sharp() & (none < begin.gap) & (none < begin.rate);
+    const LaneMask overlap = ordinary & deep & one_exit & end.is_sharp();
     const auto [time, lower, upper] = begin.closing_time();
     const Lanes last_time = end.gap / end.rate;
     clear = clear & (upper <= lesser(leave, Lanes(t_max)));
@@ -424,11 +429,12 @@ GEOMSRV_WIDE_CLONES void decide_four(const Four& pairs, double t_max, bool last_
     const Lanes scale = Lanes(1.0) / square_root(dot(reduced, reduced));
     const Lanes unit_x = with_sign_of(sign, scale * reduced.x);
     const Lanes unit_y = with_sign_of(sign, scale * reduced.y);
-    const Lanes verdict = select(never, Lanes(1.0), select(clear, Lanes(2.0), none));
+    const Lanes verdict = select(never, Lanes(1.0), select(clear, Lanes(2.0), kept(overlap, Lanes(3.0))));
     for (std::size_t k = 0; k < kLanes; ++k) {
         const int lane = static_cast<int>(k);
         PolygonMotion& out = *pairs.out[k];
         out.verdict = static_cast<PolygonMotion::Verdict>(static_cast<int>(verdict[lane]));
+        out.last_time = last_time[lane];
         if (out.verdict != PolygonMotion::Verdict::will_touch) continue;
         const bool is_a = of_a.v[lane] != 0;
         out.first = {{is_a ? 0 : 1, begin.index.at[k]}, vertex.at[k]};
@@ -436,7 +442,6 @@ GEOMSRV_WIDE_CLONES void decide_four(const Four& pairs, double t_max, bool last_
         out.time = time[lane];
         out.time_lower = lower[lane];
         out.time_upper = upper[lane];
-        out.last_time = last_time[lane];
         out.normal = {unit_x[lane], unit_y[lane]};
         const MovingPolygon& other = is_a ? *pairs.b[k] : *pairs.a[k];
         out.point = other.ring[vertex.at[k]] + out.time * other.velocity;

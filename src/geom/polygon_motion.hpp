@@ -26,8 +26,9 @@ struct EdgeAndVertex {
 struct PolygonMotion {
     enum class Verdict : std::uint8_t {
         unclear,
-        never,       ///< apart by more than the slack, within all of the window: certain
-        will_touch,  ///< certain, and a single vertex touches the inside of an edge
+        never,        ///< apart by more than the slack, within all of the window: certain
+        will_touch,   ///< certain, and a single vertex touches the inside of an edge
+        overlapping,  ///< at the start, deeper than the slack: certain
     };
     Verdict verdict = Verdict::unclear;
     EdgeAndVertex first;      ///< which touch first

@@ -123,15 +123,23 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
         const std::size_t end = p.next(i);
         const double enter = p.work[0][i];
         const double leave = p.work[1][i];
-        const auto crossing_at = [&](double time, bool entering) {
-            return crossing(pair, side, i,
-                            {1 - side, crossed_axis(q, p.local(i), p.local(end), time, entering)});
+        // Where two edges cross is on both of them, and needs to be found once.
+        const auto add_crossing = [&](double time, bool entering) {
+            const std::size_t axis = crossed_axis(q, p.local(i), p.local(end), time, entering);
+            const std::array<std::size_t, 2> edges_of_both = {side == 0 ? i : axis, side == 0 ? axis : i};
+            if (axis < q.edges) {
+                if (std::ranges::find(crossed_, edges_of_both) != crossed_.end()) {
+                    return;
+                }
+                crossed_.push_back(edges_of_both);
+            }
+            found_.push_back(crossing(pair, side, i, {1 - side, axis}));
         };
         if (enter > leave) {
             // Across a sliver, rounding may exchange the two crossings.
             const double length = std::hypot(p.x[end] - p.x[i], p.y[end] - p.y[i]);
             if (leave >= 0.0 && enter <= 1.0 && (enter - leave) * length <= merging_distance(pair, slack)) {
-                found_.push_back(crossing_at(enter, true));
+                add_crossing(enter, true);
             }
             continue;
         }
@@ -140,10 +148,10 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             found_.push_back(p.ring[i]);
         }
         if (enter > 0.0) {
-            found_.push_back(crossing_at(enter, true));
+            add_crossing(enter, true);
         }
         if (leave < 1.0) {
-            found_.push_back(crossing_at(leave, false));
+            add_crossing(leave, false);
         }
         if (leave == 1.0 && p.edges == 2) {
             found_.push_back(p.ring[end]);
@@ -153,6 +161,7 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
 
 std::span<const Vec2> PolygonOverlap::of(const PolygonPair& pair, Slack slack) {
     found_.clear();
+    crossed_.clear();
     for (const int side : {0, 1}) {
         add_part_inside(pair, side, slack);
     }

@@ -3,6 +3,8 @@
 // Intersection of two convex polygons at rest.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -23,6 +25,7 @@ public:
 private:
     void add_part_inside(const PolygonPair& pair, int side, Slack slack);
 
+    std::vector<std::array<std::size_t, 2>> crossed_;  // edges of a and of b whose crossing is known
     std::vector<Vec2> found_;
     std::vector<Vec2> merged_;
     StrictHull hull_;
