@@ -100,9 +100,14 @@ def declare(quick: bool) -> list[Scenario]:
         ),
         Scenario(
             f"first contact, polygons 4-16, {hits:.0%} hits",
-            600.0,
+            200.0,
             (lambda: gs.first_contact(a, b, velocity_a, velocity_b), len(a)),
             (lambda: baselines.numpy_first_contact(a, b, velocity_a, velocity_b), len(a)),
+        ),
+        Scenario(
+            f"first contact, polygons 4-16, {hits:.0%} hits, no points",
+            200.0,
+            (lambda: gs.first_contact(a, b, velocity_a, velocity_b, contact_set=False), len(a)),
         ),
         Scenario("polygon distance 4-16", None, (lambda: gs.distance(a, b), len(a))),
         Scenario(
@@ -122,11 +127,13 @@ def declare(quick: bool) -> list[Scenario]:
         label = f"first contact, {name}, {touch:.0%} hits, no points"
         ask = partial(gs.first_contact, *given, contact_set=False)
         table.append(Scenario(label, 30.0, (ask, len(given[0]))))
-    for name, moving in (("boxes", scenarios.moving_boxes), ("hulls 8-32", scenarios.moving_hulls)):
-        given = moving(100_000 // cut)
+    moving_hulls = scenarios.moving_hulls(100_000 // cut)
+    for name, given, target in (("boxes", moving_boxes, None), ("hulls 8-32", moving_hulls, 1000.0)):
         touch = float(np.mean(gs.first_contact(*given).status == gs.WILL_TOUCH))
         label = f"first contact, {name}, {touch:.0%} hits"
-        table.append(Scenario(label, None, (lambda given=given: gs.first_contact(*given), len(given[0]))))
+        table.append(Scenario(label, target, (partial(gs.first_contact, *given), len(given[0]))))
+    ask = partial(gs.first_contact, *moving_hulls, contact_set=False)
+    table.append(Scenario(f"{label}, no points", 1000.0, (ask, len(moving_hulls[0]))))
     far = scenarios.relative_poses(10_000 // cut, 0.35, 1.0)
     near = scenarios.relative_poses(10_000 // cut, 0.0, 0.1)
     for name, (p, q) in scenarios.SHAPE_PAIRS.items():
