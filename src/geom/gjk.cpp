@@ -315,7 +315,34 @@ void polish(Gjk& out, const Simplex<T>& simplex, double size) {
 void polish(Gjk&, const Simplex<DoubleDouble>&, double) {}
 
 template <class T, class Body>
-Gjk run(const Body& a, const Body& b, Vec3 start) {
+Vertex<T> vertex_at(const Body& a, const Body& b, int index_a, int index_b) {
+    const Vec3 p = vertex_of(a, index_a);
+    const Vec3 q = vertex_of(b, index_b);
+    return {index_a, index_b, p, q, Arithmetic<T>::difference(q, p)};
+}
+
+/// The nearest point of the feature that a witness names, which may have moved since; false if it has none.
+template <class T, class Body>
+bool resume(const Body& a, const Body& b, const Witness& from, double size, Simplex<T>& simplex,
+            Nearest<T>& nearest) {
+    if (from.count < 1 || from.count > 3) {
+        return false;
+    }
+    simplex.count = from.count;
+    for (int i = 0; i < from.count; ++i) {
+        simplex.vertex[i] = vertex_at<T>(a, b, from.a[i], from.b[i]);
+    }
+    nearest = Solver<T>(simplex, size).solve().nearest;
+    if (!(dot(nearest.direction, nearest.direction) > T{0.0})) {
+        simplex.count = 0;
+        return false;
+    }
+    reduce(simplex, nearest);
+    return true;
+}
+
+template <class T, class Body>
+Gjk run(const Body& a, const Body& b, Vec3 start, const Witness& from) {
     using Number = Arithmetic<T>;
     // Both in units of the body's own roundoff.
     constexpr double kMet = kMeetingGap * Body::kCoarseness;
@@ -327,6 +354,20 @@ Gjk run(const Body& a, const Body& b, Vec3 start) {
     bool first = true;
     double length = std::numeric_limits<double>::infinity();
     typename Number::Vec n = Number::from(start);
+    const auto approach = [&](const Nearest<T>& nearest) {
+        squared = nearest.squared;
+        length = Number::to_double(Number::root(squared));
+        const T direction = Number::root(dot(nearest.direction, nearest.direction));
+        if (!(direction > T{0.0})) {
+            return false;
+        }
+        n = Number::reciprocal(direction) * nearest.direction;
+        first = false;
+        return true;
+    };
+    if (Nearest<T> known; resume(a, b, from, size, simplex, known)) {
+        approach(known);
+    }
     while (true) {
         // The vertex of K furthest against n, and with it the gap between the supports.
         const auto top = highest(a, n);
@@ -352,12 +393,7 @@ Gjk run(const Body& a, const Body& b, Vec3 start) {
         if (holds(simplex, top.vertex, bottom.vertex)) {
             break;  // nothing lies beyond, yet the bounds have not met
         }
-        Vertex<T>& added = simplex.vertex[simplex.count++];
-        added.index_a = top.vertex;
-        added.index_b = bottom.vertex;
-        added.a = vertex_of(a, top.vertex);
-        added.b = vertex_of(b, bottom.vertex);
-        added.w = Number::difference(added.b, added.a);
+        simplex.vertex[simplex.count++] = vertex_at<T>(a, b, top.vertex, bottom.vertex);
 
         const auto answer = Solver<T>(simplex, size).solve();
         if (answer.enclosed) {
@@ -373,17 +409,12 @@ Gjk run(const Body& a, const Body& b, Vec3 start) {
             --simplex.count;
             break;
         }
-        first = false;
         reduce(simplex, answer.nearest);
-        squared = answer.nearest.squared;
-        length = Number::to_double(Number::root(squared));
-        const T direction = Number::root(dot(answer.nearest.direction, answer.nearest.direction));
-        if (!(direction > T{0.0})) {
+        if (!approach(answer.nearest)) {
             set_points(out, simplex);
             out.state = GjkState::contact;
             return out;
         }
-        n = Number::reciprocal(direction) * answer.nearest.direction;
     }
     set_points(out, simplex);
     out.state = GjkState::stalled;
@@ -402,16 +433,21 @@ Vec3 first_direction(const SingleCore& a, const SingleCore& b) {
     return d.x == 0.0F && d.y == 0.0F && d.z == 0.0F ? Vec3{1.0, 0.0, 0.0} : normalized(widened(d));
 }
 
-Gjk gjk(const Core& a, const Core& b, Vec3 start) { return run<double>(a, b, start); }
+Gjk gjk(const Core& a, const Core& b, Vec3 start) { return run<double>(a, b, start, {}); }
+
+Gjk gjk(const Core& a, const Core& b, Vec3 start, const Witness& from) {
+    const Gjk out = run<double>(a, b, start, from);
+    return out.state == GjkState::stalled ? gjk(a, b, start) : out;
+}
 
 Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start) {
-    Gjk out = run<float>(a, b, start);
+    Gjk out = run<float>(a, b, start, {});
     out.normal = normalized(out.normal);  // as doubles have it, to 4 u
     return out;
 }
 
-Gjk gjk_wide(const Core& a, const Core& b, Vec3 start) { return run<DoubleDouble>(a, b, start); }
+Gjk gjk_wide(const Core& a, const Core& b, Vec3 start) { return run<DoubleDouble>(a, b, start, {}); }
 
-Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start) { return run<double>(a, b, start); }
+Gjk gjk_wide(const SingleCore& a, const SingleCore& b, Vec3 start) { return run<double>(a, b, start, {}); }
 
 }  // namespace geomsrv

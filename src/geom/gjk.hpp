@@ -38,6 +38,10 @@ Vec3 first_direction(const SingleCore& a, const SingleCore& b);
 /// In double arithmetic, from the direction `start` (unit).
 Gjk gjk(const Core& a, const Core& b, Vec3 start);
 
+/// The same from where the bodies were nearest when last seen, if `from` says so; sooner there if they have
+/// moved little.
+Gjk gjk(const Core& a, const Core& b, Vec3 start, const Witness& from);
+
 /// In single precision.
 Gjk gjk(const SingleCore& a, const SingleCore& b, Vec3 start);
 

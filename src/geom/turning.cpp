@@ -42,6 +42,10 @@ constexpr int kMostLooks = 1 << 16;
 // bodies.
 constexpr double kFar = 2.0;
 
+// Where bodies are further apart than this share of their size, the next look starts from the feature seen;
+// nearer, from the direction that is expected, which is the better one where the feature drowns in rounding.
+constexpr double kFarEnough = 0x1p-20;
+
 // Heights of vertices along a unit direction and their least and largest, in doubles: products and sums of
 // three terms, no longer than the size of the pair, 8 u for each body.
 constexpr double kHeightError = 16 * kUnitRoundoff;
@@ -209,7 +213,9 @@ TurningSolver::Look TurningSolver::look(double t, Vec3 start) {
     at.b.reach += away;
     at.size = at.a.reach + at.b.reach + slack_.margin;
     at.error = at.a.error + at.b.error + kUnitRoundoff * away + at.between_error + vague(t);
-    at.found = gjk(at.a, at.b, start);
+    at.found = gjk(at.a, at.b, start, seen_);
+    const bool far = at.found.state == GjkState::apart && at.found.gap > kFarEnough * at.size;
+    seen_ = far ? at.found.witness : Witness{};
     return at;
 }
 
@@ -652,6 +658,7 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
                                      double tolerance, const TurningSlack& slack, bool contact_set) {
     prepare(a, b, slack);
     looks_ = 0;
+    seen_ = {};
     const double end = std::min(t_max, end_of_period());
     const double near = kFar * (a_.body.reach() + b_.body.reach());
     TurningContact out;

@@ -93,6 +93,7 @@ private:
     Vec3 velocity_;             // the same, in doubles
     TurningSlack slack_;
     int looks_ = 0;  // at this pair
+    Witness seen_;   // where it was nearest when last seen apart
     Vec3 center_a_, velocity_a_;
     PlacedContactPoints contact_;
     std::vector<Vec3> points_;
