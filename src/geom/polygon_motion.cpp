@@ -46,7 +46,6 @@ struct LaneVec2 {
 };
 
 GEOMSRV_INLINE Lanes dot(const LaneVec2& a, const LaneVec2& b) { return a.x * b.x + a.y * b.y; }
-GEOMSRV_INLINE Lanes cross(const LaneVec2& a, const LaneVec2& b) { return a.x * b.y - a.y * b.x; }
 GEOMSRV_INLINE Lanes size_of(const LaneVec2& a) { return magnitude(a.x) + magnitude(a.y); }
 
 GEOMSRV_INLINE LaneVec2 joined(const Vec2 (&v)[kLanes]) {
