@@ -111,9 +111,10 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
     rows.point_offsets[0] = 0;
     constexpr bool kInBlocks =
         std::is_same_v<Solver, FirstContactSolver> || std::is_same_v<Solver, ExactFirstContactSolver>;
-    std::array<MovingPolygon, kPolygonMotionBlock> block_a;
-    std::array<MovingPolygon, kPolygonMotionBlock> block_b;
-    std::array<PolygonMotion, kPolygonMotionBlock> known;
+    const std::size_t block = kInBlocks ? std::min(count, kPolygonMotionBlock) : 0;
+    std::vector<MovingPolygon> block_a(block);
+    std::vector<MovingPolygon> block_b(block);
+    std::vector<PolygonMotion> known(block);
     for (std::size_t i = 0; i < count; ++i) {
         const std::size_t place = i % kPolygonMotionBlock;
         if (kInBlocks && place == 0) {
