@@ -5,25 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace geomsrv {
 
-namespace {
-
-double component(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
-}  // namespace
-
-void ContactPlane::face(Vec3 normal) {
-    // Along the largest component of the normal onto the plane of the other two, the right way round.
+void choose_axes(Vec3 normal, int (&axis)[2]) {
     const double size[3] = {std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z)};
     const int k = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-    axis_[0] = (k + 1) % 3;
-    axis_[1] = (k + 2) % 3;
+    axis[0] = (k + 1) % 3;
+    axis[1] = (k + 2) % 3;
     if (component(normal, k) < 0.0) {
-        std::swap(axis_[0], axis_[1]);
+        std::swap(axis[0], axis[1]);
     }
 }
+
+void ContactPlane::face(Vec3 normal) { choose_axes(normal, axis_); }
 
 Vec2 ContactPlane::flat(Vec3 v) const { return {component(v, axis_[0]), component(v, axis_[1])}; }
 

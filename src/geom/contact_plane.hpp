@@ -29,6 +29,10 @@ inline bool clip_part(double from, double to, double slack, double& first, doubl
     return true;
 }
 
+/// The two coordinates that are left when looking along the largest component of a normal, in the order that
+/// makes counter-clockwise about the normal.
+void choose_axes(Vec3 normal, int (&axis)[2]);
+
 class ContactPlane {
 public:
     /// On an edge of a body, or at a vertex of it if both ends are the same.
@@ -39,7 +43,7 @@ public:
         double part;  ///< of the way from one to the other
     };
 
-    /// Looks along the largest component of a normal, so that counter-clockwise is about the normal.
+    /// See choose_axes().
     void face(Vec3 normal);
     [[nodiscard]] Vec2 flat(Vec3 v) const;
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <tuple>
 
+#include "geom/contact_plane.hpp"
 #include "geom/exact_direction.hpp"
 #include "geom/rounding.hpp"
 
@@ -28,8 +29,6 @@ template <class N>
 N entry(const VectorOf<N>& v, int k) {
     return k == 0 ? v.x : k == 1 ? v.y : v.z;
 }
-
-double entry(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 bool round_ratio(const Enclosed& numerator, const Enclosed& denominator, double& out) {
     Rounding found;
@@ -297,13 +296,7 @@ std::span<const Vec3> ExactContactPoints::touching(ExactRay& ray, RayEnd end, bo
     if (!ray.ordinary() || !round_direction(ray.support<Enclosed>(end), n)) {
         round_direction(ray.support<Exact>(end), n);
     }
-    const double size[3] = {std::fabs(n.x), std::fabs(n.y), std::fabs(n.z)};
-    const int k = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
-    axis_[0] = (k + 1) % 3;
-    axis_[1] = (k + 2) % 3;
-    if (entry(n, k) < 0.0) {
-        std::swap(axis_[0], axis_[1]);
-    }
+    choose_axes(n, axis_);
     ray.faces(end, face_[0], face_[1]);
     for (const int body : {0, 1}) {
         corner_[body].clear();

@@ -126,8 +126,6 @@ GEOMSRV_INLINE std::pair<int, int> tops_of(const Core& core, Vec3 n, Vec3 m) {
     return {top_of(core, n), top_of(core, m)};
 }
 
-GEOMSRV_INLINE double component(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
 /// Coordinates across the line: along it, onto a coordinate plane.
 struct Across {
     int k, i, j;

@@ -38,6 +38,7 @@ constexpr Vec3 cross(Vec3 a, Vec3 b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
+constexpr double component(Vec3 v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 /// Three rows; as a rotation it takes coordinates in b to coordinates in a.
 struct Mat3 {
