@@ -22,8 +22,8 @@ from geomsrv.narrow_phase import placed_boxes
 from geomsrv.placement import laid_flat
 from geomsrv.shapes import Box, Boxes, Polygon, Polygons, Polytopes, Shape, vertices_of
 from geomsrv.trajectory import Search, Trajectory
-from geomsrv.turning_pairs import core_of_solids, radii
-from geomsrv.world import ROUNDOFF, ShapeTable, World
+from geomsrv.turning_pairs import CAPSULE_ROUNDING, core_of_solids, radii
+from geomsrv.world import ShapeTable, World
 
 __all__ = ["AlongContacts", "contacts_along", "path_of"]
 
@@ -201,9 +201,9 @@ def _search(
     else:
         obstacles = Polytopes(*core_of_solids(world, rows))
     margin = np.zeros(len(rows)) if path.planar else radii(world)[rows] + table.round[0] * _is_round(table)[0]
-    # Ends of capsules are placed, and radii added.
     size = np.abs(world.poses[rows, :3]).sum(axis=1) + world.table.reach[world.shape[rows]]
-    rounding = 16.0 * ROUNDOFF * (margin + np.where(margin > 0.0, size, 0.0))
+    # Ends of capsules are placed, and radii added.
+    rounding = CAPSULE_ROUNDING * (margin + np.where(margin > 0.0, size, 0.0))
     room = np.column_stack([margin, doubt[:, 0] + rounding, doubt[:, 1]])
     drift = np.ascontiguousarray(world.twists[rows, : 2 if path.planar else 3])
     search = Search(_core_vertices(body, table), path, obstacles, drift, tolerance, room)

@@ -45,6 +45,7 @@ from geomsrv.turning import TIME_TOLERANCE, approach, settled_at_start, velocity
 from geomsrv.world import ROUNDOFF, World
 
 __all__ = [
+    "CAPSULE_ROUNDING",
     "Question",
     "climbed_contact_rows",
     "closing_speeds",

@@ -32,13 +32,13 @@ def icosahedron(radius: float, halvings: int) -> gs.Mesh:
     """A convex ball of triangles: midpoints of edges are pushed out."""
     corners = [p for a in (1, -1) for b in (PHI, -PHI) for p in ((0, a, b), (a, b, 0), (b, 0, a))]
     points = np.array(corners, float)
-    near = 2.0 + 1e-9
+    edge = 2.0 + 1e-9  # other distances of corners are longer by more than one
     faces = [
         (i, j, k)
         for i in range(12)
         for j in range(i)
         for k in range(j)
-        if max(np.linalg.norm(points[u] - points[v]) for u, v in ((i, j), (j, k), (k, i))) <= near
+        if max(np.linalg.norm(points[u] - points[v]) for u, v in ((i, j), (j, k), (k, i))) <= edge
     ]
     triangles = points[np.array(faces)] / np.linalg.norm(points[0])
     for _ in range(halvings):
