@@ -3,9 +3,12 @@
 #include "geom/contact_points.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "geom/convex_convex.hpp"
 #include "geom/lanes.hpp"
@@ -14,6 +17,13 @@
 namespace geomsrv {
 
 namespace {
+
+constexpr std::size_t kLanes = Lanes::kCount;
+constexpr int kWord = 64;
+
+// So many heights of vertices above planes are worth finding beforehand, though most edges of large hulls end
+// at the first planes that they are held against: 128 KiB.
+constexpr std::size_t kMostHeights = std::size_t{1} << 14;
 
 /// A vertex of a body as given, rounded.
 Vec3 given_vertex(const ExactBody& body, int vertex) {
@@ -52,34 +62,89 @@ GEOMSRV_WIDE_CLONES double heights(const Core& core, Vec3 n, double* out) {
     return greatest(top);
 }
 
-/// clip_part() by all planes, four at a time.
-GEOMSRV_WIDE_CLONES Span clip_edge(const std::vector<double> (&row)[6], Vec3 p, Vec3 q, double slack) {
-    Span out;
+using PlaneRows = std::vector<double>[6];
+
+/// Heights of a point above four planes.
+GEOMSRV_INLINE Lanes heights_above_four(const PlaneRows& row, std::size_t k, Vec3 p) {
+    const auto part = [&](int normal, double v, int base) __attribute__((always_inline)) {
+        return Lanes::load(row[normal].data() + k) * (Lanes(v) - Lanes::load(row[base].data() + k));
+    };
+    return part(0, p.x, 3) + part(1, p.y, 4) + part(2, p.z, 5);
+}
+
+/// And above all.
+GEOMSRV_WIDE_CLONES void heights_above(const PlaneRows& row, Vec3 p, double* out) {
+    for (std::size_t k = 0; k < row[0].size(); k += kLanes) heights_above_four(row, k, p).store(out + k);
+}
+
+/// Whether a plane has both points more than the slack above it.
+GEOMSRV_WIDE_CLONES bool are_outside(const PlaneRows& row, Vec3 p, Vec3 q, double slack) {
+    for (std::size_t k = 0; k < row[0].size(); k += kLanes) {
+        const Lanes most = slack;
+        if (any((most < heights_above_four(row, k, p)) & (most < heights_above_four(row, k, q)))) return true;
+    }
+    return false;
+}
+
+/// Which of up to 64 numbers, in whole lanes, are not less than one: number i as bit i.
+GEOMSRV_WIDE_CLONES std::uint64_t at_least(const double* numbers, std::size_t count, double least) {
+    LaneMask::Vector bits{1, 2, 4, 8};
+    LaneMask::Vector found{};
+    for (std::size_t i = 0; i < count; i += kLanes) {
+        found |= (Lanes(least) <= Lanes::load(numbers + i)).v & bits;
+        bits <<= kLanes;
+    }
+    return static_cast<std::uint64_t>((found[0] | found[1]) | (found[2] | found[3]));
+}
+
+/// clip_part() by all planes, of which the heights of both ends are given, four at a time.
+GEOMSRV_WIDE_CLONES Span clip_edge(const double* from, const double* to, std::size_t planes, double slack) {
     const Lanes most = slack;
-    for (std::size_t k = 0; k < row[0].size(); k += Lanes::kCount) {
-        const auto height = [&](Vec3 v) __attribute__((always_inline)) {
-            return Lanes::load(row[0].data() + k) * (Lanes(v.x) - Lanes::load(row[3].data() + k)) +
-                   Lanes::load(row[1].data() + k) * (Lanes(v.y) - Lanes::load(row[4].data() + k)) +
-                   Lanes::load(row[2].data() + k) * (Lanes(v.z) - Lanes::load(row[5].data() + k));
-        };
-        const Lanes from = height(p);
-        const Lanes to = height(q);
-        const LaneMask starts_out = most < from;
-        const LaneMask ends_out = most < to;
+    const Lanes none = 0.0;
+    const Lanes all_of_it = 1.0;
+    LaneMask any_out = none < none;
+    for (std::size_t k = 0; k < planes; k += kLanes) {
+        const LaneMask starts_out = most < Lanes::load(from + k);
+        const LaneMask ends_out = most < Lanes::load(to + k);
         if (any(starts_out & ends_out)) {
-            out.any = false;
-            return out;
+            return {.any = false};
         }
-        if (!any(starts_out | ends_out)) {
-            continue;
+        any_out = any_out | starts_out | ends_out;
+    }
+    Span out;
+    if (!any(any_out)) {
+        return out;
+    }
+    Lanes first = none;
+    Lanes last = all_of_it;
+    Lanes first_plane = -1.0;
+    Lanes last_plane = -1.0;
+    for (std::size_t k = 0; k < planes; k += kLanes) {
+        const Lanes start = Lanes::load(from + k);
+        const Lanes end = Lanes::load(to + k);
+        const Lanes crossing = greater(none, lesser(all_of_it, start / (start - end)));
+        const Lanes plane = static_cast<double>(k);
+        const LaneMask later = (most < start) & (first < crossing);
+        const LaneMask sooner = (most < end) & (crossing < last);
+        first = select(later, crossing, first);
+        first_plane = select(later, plane, first_plane);
+        last = select(sooner, crossing, last);
+        last_plane = select(sooner, plane, last_plane);
+    }
+    // Of equal ones the plane that is listed first.
+    for (int i = 0; i < Lanes::kCount; ++i) {
+        const auto in_lane = [&](const Lanes& plane) {
+            return plane[i] < 0.0 ? -1 : static_cast<int>(plane[i]) + i;
+        };
+        const int opening = in_lane(first_plane);
+        if (opening >= 0 && (first[i] > out.first || (first[i] == out.first && opening < out.first_plane))) {
+            out.first = first[i];
+            out.first_plane = opening;
         }
-        for (int i = 0; i < static_cast<int>(Lanes::kCount); ++i) {
-            const double first = out.first;
-            const double last = out.last;
-            clip_part(from[i], to[i], slack, out.first, out.last);
-            const int plane = static_cast<int>(k) + i;
-            out.first_plane = out.first > first ? plane : out.first_plane;
-            out.last_plane = out.last < last ? plane : out.last_plane;
+        const int closing = in_lane(last_plane);
+        if (closing >= 0 && (last[i] < out.last || (last[i] == out.last && closing < out.last_plane))) {
+            out.last = last[i];
+            out.last_plane = closing;
         }
     }
     return out;
@@ -99,10 +164,17 @@ void ContactPoints::collect(const Core& core, int listed, Vec3 normal, double sl
     };
     if (core.points != nullptr) {
         heights_.resize(static_cast<std::size_t>(core.count));
-        const double top = heights(core, n, heights_.data());
-        for (int i = 0; i < listed; ++i) {
-            if (heights_[static_cast<std::size_t>(i)] >= top - slack) {
-                add(i);
+        const double least = heights(core, n, heights_.data()) - slack;
+        for (int first = 0; first < listed; first += kWord) {
+            const int many = std::min(kWord, core.count - first);
+            for (std::uint64_t bits =
+                     at_least(heights_.data() + first, static_cast<std::size_t>(many), least);
+                 bits != 0; bits &= bits - 1) {
+                // Beyond the listed ones the last is repeated.
+                const int i = first + std::countr_zero(bits);
+                if (i < listed) {
+                    add(i);
+                }
             }
         }
         return;
@@ -263,6 +335,7 @@ void ContactPoints::add_corners(const MovingPair& pair, int body, double slack) 
     const std::vector<Vec3>& own = bounds_[body].normal;
     const Planes& other = bounds_[1 - body];
     outward_.assign(static_cast<std::size_t>(faces_[body].exact().count()), {});
+    taken_.assign(outward_.size(), false);
     const auto beside = [&](const FaceEdge& edge) {
         const auto normal = [&](int plane) {
             return plane < 0 ? Vec3{} : own[static_cast<std::size_t>(plane)];
@@ -275,10 +348,25 @@ void ContactPoints::add_corners(const MovingPair& pair, int body, double slack) 
             outward = outward + beside(edge);
         }
     }
+    // Of all vertices beforehand, or of an edge when it is known to be of use.
+    const std::size_t planes = other.row[0].size();
+    const bool few = outward_.size() * planes <= kMostHeights;
+    heights_.resize((few ? outward_.size() : 2) * planes);
+    const auto row_of = [&](int i) { return heights_.data() + static_cast<std::size_t>(i) * planes; };
+    for (int i = 0; few && i < faces_[body].exact().count(); ++i) {
+        heights_above(other.row, vertex_of(core, i), row_of(i));
+    }
     for (const FaceEdge& edge : faces_[body].edges()) {
         const Vec3 p = vertex_of(core, edge.from);
         const Vec3 q = vertex_of(core, edge.to);
-        const Span left = clip_edge(other.row, p, q, slack);
+        if (!few) {
+            if (are_outside(other.row, p, q, slack)) {
+                continue;
+            }
+            heights_above(other.row, p, row_of(0));
+            heights_above(other.row, q, row_of(1));
+        }
+        const Span left = clip_edge(row_of(few ? edge.from : 0), row_of(few ? edge.to : 1), planes, slack);
         if (!left.any || (left.first - left.last) * norm(q - p) > slack) {
             continue;
         }
@@ -286,6 +374,9 @@ void ContactPoints::add_corners(const MovingPair& pair, int body, double slack) 
             const int from = part == 1.0 ? edge.to : edge.from;
             const int to = part == 0.0 ? edge.from : edge.to;
             const bool vertex = from == to;
+            if (vertex && std::exchange(taken_[static_cast<std::size_t>(from)], true)) {
+                return;
+            }
             const Vec3 start = vertex_of(core, from);
             Vec3 outward = vertex ? outward_[static_cast<std::size_t>(from)] : beside(edge);
             if (!vertex && plane >= 0) {
@@ -296,7 +387,9 @@ void ContactPoints::add_corners(const MovingPair& pair, int body, double slack) 
         };
         const bool ordered = left.first <= left.last;
         add(ordered ? left.first : left.last, ordered ? left.first_plane : left.last_plane);
-        add(ordered ? left.last : left.first, ordered ? left.last_plane : left.first_plane);
+        if (left.first != left.last) {
+            add(ordered ? left.last : left.first, ordered ? left.last_plane : left.first_plane);
+        }
     }
 }
 
@@ -345,15 +438,9 @@ std::span<const Vec3> ContactPoints::overlapping(const MovingPair& pair, double 
     corners_.clear();
     add_corners(pair, 0, slack);
     add_corners(pair, 1, slack);
-    // A vertex ends several edges.
     std::sort(corners_.begin(), corners_.end(), [](const Corner& p, const Corner& q) {
         return ContactPlane::vertices_first(q.point, p.point);
     });
-    const auto last = std::unique(corners_.begin(), corners_.end(), [](const Corner& p, const Corner& q) {
-        return !ContactPlane::vertices_first(p.point, q.point) &&
-               !ContactPlane::vertices_first(q.point, p.point);
-    });
-    corners_.erase(last, corners_.end());
     // Points within the slack of the hull of the others go; crossings first.
     for (std::size_t i = 0; i < corners_.size() && corners_.size() > 1;) {
         if (!stands_out(i, slack) && is_in_hull_of_others(i, pair.reach(), slack)) {

@@ -63,10 +63,11 @@ private:
     [[nodiscard]] Vec3 world(const MovingPair& pair, const Point& point, double moment) const;
 
     ContactPlane plane_;
-    std::vector<double> heights_;
+    std::vector<double> heights_;  // of vertices, along the normal or above the planes of the other body
     PolytopeFaces faces_[2];
     Planes bounds_[2];
     std::vector<Vec3> outward_;  // of each vertex of a body
+    std::vector<char> taken_;    // of each, whether it is a corner already: it ends several edges
     std::vector<Corner> corners_;
     std::vector<double> rows_;
     std::vector<Vec3> points_;

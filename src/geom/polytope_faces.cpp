@@ -367,22 +367,27 @@ void PolytopeFaces::insert(int x) {
 
 /// Every side of a triangle runs back in exactly one other.
 void PolytopeFaces::find_neighbours() {
-    const auto start = [&](std::size_t side) { return triangles_[side / 3].corner[side % 3]; };
-    const auto end = [&](std::size_t side) { return triangles_[side / 3].corner[(side + 1) % 3]; };
     const std::size_t sides = 3 * triangles_.size();
     first_side_.assign(static_cast<std::size_t>(exact_->count()), -1);
     next_side_.resize(sides);
+    end_.resize(sides);
     twin_.assign(sides, -1);
     for (std::size_t side = 0; side < sides; ++side) {
-        int& first = first_side_[static_cast<std::size_t>(start(side))];
+        const auto& corner = triangles_[side / 3].corner;
+        const int from = corner[side % 3];
+        const int to = corner[(side + 1) % 3];
+        end_[side] = to;
+        int& first = first_side_[static_cast<std::size_t>(from)];
         next_side_[side] = std::exchange(first, static_cast<int>(side));
-    }
-    for (std::size_t side = 0; side < sides; ++side) {
-        int other = first_side_[static_cast<std::size_t>(end(side))];
-        while (other >= 0 && end(static_cast<std::size_t>(other)) != start(side)) {
+        // The one that runs back starts where this one ends; whichever comes later finds the other.
+        int other = first_side_[static_cast<std::size_t>(to)];
+        while (other >= 0 && end_[static_cast<std::size_t>(other)] != from) {
             other = next_side_[static_cast<std::size_t>(other)];
         }
-        twin_[side] = other;
+        if (other >= 0) {
+            twin_[side] = other;
+            twin_[static_cast<std::size_t>(other)] = static_cast<int>(side);
+        }
     }
 }
 

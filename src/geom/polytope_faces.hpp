@@ -100,6 +100,7 @@ private:
     std::vector<FaceEdge> horizon_;
     std::vector<int> first_side_;  // of a vertex: the first of the sides 3 triangle + k that start there
     std::vector<int> next_side_;   // of a side: the next that starts at the same vertex
+    std::vector<int> end_;         // of a side: the vertex at its end
     std::vector<int> twin_;        // of a side: the one that runs back
     std::vector<int> open_;        // triangles whose neighbours are to be looked at
     std::vector<int> pieces_;      // of a plane: its triangles
