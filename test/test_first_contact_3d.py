@@ -485,6 +485,19 @@ def test_without_contact_set(rng):
         assert full.time == bare.time and (full.normal == bare.normal).all()
 
 
+@pytest.mark.parametrize("count", [8, 40, 70, 150])
+def test_what_hulls_share_has_the_exact_vertices(rng, count):
+    """Edges of small hulls are clipped by the heights of all vertices, those of large ones one by one."""
+    for _ in range(4):
+        a, b = polytopes(spherical(rng, count)), polytopes(spherical(rng, count) + rng.uniform(-0.4, 0.4, 3))
+        nearly, exactly = (gs.first_contact(a, b, (0, 0, 1), (0, 0, 0), accuracy=tier) for tier in ("float64", "exact"))
+        assert nearly.status == exactly.status == gs.OVERLAPPING
+        assert len(exactly.points) > count / 4
+        # Points are off by some 1e-15, and crossings by as much over the angle, which here is above 1e-3.
+        assert set_distance(nearly.points, exactly.points) < 1e-12
+        assert len(nearly.points) == len(exactly.points)
+
+
 # --------------------------------------------------------------------------------------- boxes by their axes
 
 
