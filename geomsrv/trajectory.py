@@ -49,6 +49,8 @@ class Piece(NamedTuple):
     angular: FloatArray  #: (3,) [rad/s]
     straying: float  #: how far the origin may be from where the motion has it [m]
     leaning: float  #: how far the angle may be [rad]
+    sizes: float  #: sum of the magnitudes of all that its places are sums of [m]
+    angles: float  #: the same of its angles [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +126,13 @@ class Trajectory:
         if self.planar:
             place = np.array([here[0], here[1], 0.0])
             linear = np.array([there[0] - here[0], there[1] - here[1], 0.0]) / duration
-            angular = np.array([0.0, 0.0, there[2] - here[2]]) / duration
-            return Piece(start, end, _about_z(here[2]), place, linear, angular, 0.0, 0.0)
-        turn = _validate.rotation_matrices(here[None, 3:])[0]
-        linear, angular = (there[:3] - here[:3]) / duration, _rotation_between(here[3:], there[3:]) / duration
-        return Piece(start, end, turn, here[:3], linear, angular, 0.0, 0.0)
+            angular, turn = np.array([0.0, 0.0, there[2] - here[2]]) / duration, _about_z(here[2])
+        else:
+            place, turn = here[:3], _validate.rotation_matrices(here[None, 3:])[0]
+            linear, angular = (there[:3] - here[:3]) / duration, _rotation_between(here[3:], there[3:]) / duration
+        sizes = float(np.abs(place).sum() + duration * np.abs(linear).sum())
+        angles = duration * float(np.linalg.norm(angular))
+        return Piece(start, end, turn, place, linear, angular, 0.0, 0.0, sizes, angles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +221,13 @@ class AcceleratedMotion:
         """The duration [s]."""
         return self.duration
 
+    def _sizes(self, until: float) -> float:
+        """Sum of the magnitudes of all that places until a time are sums of."""
+        parts = np.abs(self.pose[: len(self.velocity)]) + until * (
+            np.abs(self.velocity) + 0.5 * until * np.abs(self.acceleration)
+        )
+        return float(parts.sum())
+
     def pieces(self) -> list[tuple[float, float]]:
         """All of it."""
         return [(0.0, self.duration)]
@@ -234,9 +245,11 @@ class AcceleratedMotion:
             turn, place, linear = _about_z(self.pose[2] + angle[2]), np.append(place, 0.0), np.append(linear, 0.0)
         else:
             turn = _about(angle) @ _validate.rotation_matrices(self.pose[None, 3:])[0]
-        stray, lean = (float(np.linalg.norm(x)) * over for x in (self.acceleration, self.angular_acceleration))
-        lean += PLACE_ROUNDING * float(np.linalg.norm(angle))
-        return Piece(start, end, turn, place, linear, angular, stray, lean)
+        gain, rate, gain_about = (
+            float(np.linalg.norm(x)) for x in (self.acceleration, self.angular_velocity, self.angular_acceleration)
+        )
+        angles = end * (rate + 0.5 * end * gain_about) + (abs(float(self.pose[2])) if self.planar else 0.0)
+        return Piece(start, end, turn, place, linear, angular, gain * over, gain_about * over, self._sizes(end), angles)
 
 
 Motion = Trajectory | AcceleratedMotion
@@ -403,8 +416,8 @@ class Search:
         motion = np.concatenate([piece.linear, piece.angular, piece.place])[None]
         others, motions = self._others(rows, since)
         rounding = PLACE_ROUNDING * (
-            self._reach * (1.0 + length * float(np.linalg.norm(piece.angular)))
-            + float(np.abs(piece.place).sum() + length * np.abs(piece.linear).sum())
+            self._reach * (1.0 + piece.angles)
+            + piece.sizes
             + self._far[rows]
             + np.abs(self._drift).max(axis=1)[rows if len(self._drift) > 1 else 0] * (since + length)
         )

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """First contact along planned paths and under acceleration, by another way to say where bodies are."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from conftest import reproducer
@@ -237,6 +239,30 @@ def test_acceleration_in_closed_form():
     spin_up = gs.AcceleratedMotion([0, 0, 0], [0, 0], acceleration=[0, 0], angular_acceleration=2.0, duration=3.0)
     found = gs.first_contact_along(rod, spin_up, post)
     assert found.time_lower[0] <= np.sqrt(np.pi / 2.0) <= found.time_upper[0] + 1e-12
+
+
+def test_places_that_cancel(rng):
+    """A point comes a hundred thousand kilometres, and turns back a hair beyond a wall: in rational numbers."""
+    point, missed = gs.Polygon([(0, 0)]), 0
+    for _ in range(50):
+        place = -rng.uniform(1e8, 2e8)
+        speed, gain = -2.0 * place, place * rng.uniform(1.998, 2.002)
+        apex = Fraction(place) - Fraction(speed) ** 2 / (2 * Fraction(gain))
+        wall = float(apex) - np.exp(rng.uniform(np.log(1e-9), np.log(1e-5)))
+        motion = gs.AcceleratedMotion([place, 0, 0], [speed, 0], acceleration=[gain, 0], duration=2.0)
+        found = gs.first_contact_along(point, motion, gs.Polygons.from_list([[(wall, -1), (wall, 1)]]), tolerance=1e-9)
+        given = reproducer(place=place, speed=speed, gain=gain, wall=wall)
+        missed += apex < wall  # it is rounded
+        if found.status == ContactStatus.NEVER:
+            assert apex < wall, given
+            continue
+        early, late = (
+            Fraction(place) + Fraction(t) * (Fraction(speed) + Fraction(gain) * Fraction(t) / 2) - Fraction(wall)
+            for t in (found.time_lower[0], min(found.time_upper[0], 1e3))
+        )
+        assert early <= 0, given
+        assert np.isinf(found.time_upper[0]) or late >= 0, given
+    assert missed < 25
 
 
 def test_start_is_named():
