@@ -1,6 +1,6 @@
 # Copyright 2026 The geomsrv authors
 # SPDX-License-Identifier: Apache-2.0
-"""First contact of a body on a planned path with objects of a scene: `first_contact_along`, of objects where they are.
+"""First contact of a body on its way with objects of a scene: `first_contact_along`, of objects where they are.
 
 Of spheres and capsules the cores are followed, which are in contact when they are as near as the radii.  What the body
 and an object may be off by widens the interval, as it does for all pairs of a scene.
@@ -21,11 +21,11 @@ from geomsrv.errors import GeometryError
 from geomsrv.narrow_phase import placed_boxes
 from geomsrv.placement import laid_flat
 from geomsrv.shapes import Box, Boxes, Polygon, Polygons, Polytopes, Shape, vertices_of
-from geomsrv.trajectory import Search, Trajectory
+from geomsrv.trajectory import AcceleratedMotion, Motion, Search, Trajectory
 from geomsrv.turning_pairs import CAPSULE_ROUNDING, core_of_solids, radii
 from geomsrv.world import ShapeTable, World
 
-__all__ = ["AlongContacts", "contacts_along", "path_of"]
+__all__ = ["AlongContacts", "contacts_along", "motion_of"]
 
 KINDS = (
     "box",
@@ -67,29 +67,66 @@ class AlongContacts(Bounded):
     cost: Cost
 
 
-def path_of(times: FloatArray, poses: FloatArray, flat: bool) -> Trajectory:
-    """A path from now on; of a polygon in the plane, with yaw angles, rounded, that turn by less than half a turn each.
+def motion_of(times: FloatArray, poses: FloatArray, twist: FloatArray, acceleration: FloatArray, flat: bool) -> Motion:
+    """A motion from now on: along `poses` (k, 7), or, where the other two are given, of second order from one pose.
+
+    A polygon's is one in the plane, with yaw angles, rounded, that turn by less than half a turn from pose to pose.
 
     Raises
     ------
     GeometryError
         Names the argument, the row and the fault.
     """
-    path = Trajectory(times, poses)
-    if path.start != 0.0:
-        raise GeometryError(f"times[0] must be 0, where the path begins: now; got {path.start:g}")
-    if not flat:
-        return path
-    laid, faults = laid_flat(path.poses, None, np.ones(len(poses), np.bool_))
+    begin = "times[0] must be 0, where the motion begins: now; got {:g}"
+    if not (len(twist) or len(acceleration)):
+        path = Trajectory(times, poses)
+        if path.start != 0.0:
+            raise GeometryError(begin.format(path.start))
+        return Trajectory(path.times, _in_plane(path.poses)) if flat else path
+    rates = {"twist": twist, "acceleration": acceleration}
+    for name, numbers in rates.items():
+        if len(numbers) != 6:
+            raise GeometryError(f"twist and acceleration must hold 6 numbers each, or none; {name} has {len(numbers)}")
+        _validate.floats(numbers, name, (6,))
+        if flat and numbers[2:5].any():
+            raise GeometryError(f"{name}[2:5] must be 0: a polygon stays in the plane z = 0 of the fixed frame")
+    for name, items, count in (("times", times, 2), ("poses", poses, 1)):
+        if len(items) != count:
+            what = "0 and the duration" if name == "times" else "the one at the start"
+            raise GeometryError(f"{name} must be {what}, where a twist is given; got {len(items)}")
+    start, end = _validate.floats(times, "times", (2,)).tolist()
+    if start != 0.0:
+        raise GeometryError(begin.format(start))
+    if not end > 0.0:
+        raise GeometryError(f"times[1] must be > 0, the duration; got {end:g}")
+    pose = _validate.poses(poses, "poses")
+    place = (_in_plane(pose) if flat else pose)[0]
+    along, about = (slice(2), 5) if flat else (slice(3), slice(3, 6))
+    try:
+        return AcceleratedMotion(
+            place,
+            twist[along],
+            acceleration=acceleration[along],
+            angular_velocity=twist[about],
+            angular_acceleration=acceleration[about],
+            duration=end,
+        )
+    except GeometryError as fault:  # what is left to be wrong: the axes
+        raise GeometryError(f"twist[3:], acceleration[3:]: {fault}") from None
+
+
+def _in_plane(poses: FloatArray) -> FloatArray:
+    """(k, 3) x, y and yaw of poses of a polygon."""
+    laid, faults = laid_flat(poses, None, np.ones(len(poses), np.bool_))
     if faults:
         row = min(faults)
         raise GeometryError(f"poses[{row}]: {faults[row]}")
     yaw = np.unwrap(2.0 * np.arctan2(laid[:, 5], laid[:, 6]))
-    return Trajectory(path.times, np.column_stack([laid[:, :2], yaw]))
+    return np.column_stack([laid[:, :2], yaw])
 
 
 def contacts_along(
-    world: World, body: Shape, off: float, path: Trajectory, rows: IntArray, tolerance: float
+    world: World, body: Shape, off: float, path: Motion, rows: IntArray, tolerance: float
 ) -> AlongContacts:
     """When a body on a path first touches the objects in some rows of a world, which keep their velocities.
 
@@ -99,7 +136,7 @@ def contacts_along(
         In its own frame, which the path places.
     off : float
         How far it may be off the path [m].
-    path : Trajectory
+    path : Trajectory or AcceleratedMotion
         In the plane for a Polygon; its times are those of the world from now.
     rows : (n,) int64
     tolerance : float
@@ -173,24 +210,21 @@ def _is_round(table: ShapeTable) -> NDArray[np.bool_]:
     return np.array([shape.kind in ("sphere", "capsule") for shape in table.shapes])
 
 
-def _clear(world: World, table: ShapeTable, off: float, path: Trajectory, rows: IntArray) -> BoolArray:
+def _clear(world: World, table: ShapeTable, off: float, path: Motion, rows: IntArray) -> BoolArray:
     """(n,) bool: objects whose swept boxes keep clear of a box around the path, and so never meet the body."""
     if not len(rows):
         return np.zeros(0, np.bool_)
     swept = boxes_swept(world, path.end, rows)
-    places = path.poses[:, :3].copy()
-    if path.planar:
-        places[:, 2] = 0.0
+    span = path.span
+    # However it turns, the body is in the ball around its origin.
     reach = float(table.reach[0]) + off
-    # However it turns, the body is in the ball around its origin, which moves straight from place to place.
-    reach += AABB_ROUNDING * (reach + float(np.abs(places).sum(axis=1).max()))
-    low, high = places.min(axis=0) - reach, places.max(axis=0) + reach
-    clear: BoolArray = ((swept.upper < low) | (swept.lower > high)).any(axis=1)
+    reach += AABB_ROUNDING * (reach + float(np.abs(span).max(axis=0).sum()))
+    clear: BoolArray = ((swept.upper < span[0] - reach) | (swept.lower > span[1] + reach)).any(axis=1)
     return clear
 
 
 def _search(
-    world: World, table: ShapeTable, path: Trajectory, rows: IntArray, tolerance: float, doubt: FloatArray
+    world: World, table: ShapeTable, path: Motion, rows: IntArray, tolerance: float, doubt: FloatArray
 ) -> Search:
     body = table.shapes[0]
     obstacles: Polygons | Boxes | Polytopes

@@ -113,6 +113,20 @@ class Trajectory:
         """Time of the last pose [s]."""
         return float(self.times[-1])
 
+    @property
+    def turns(self) -> bool:
+        """Whether the body turns."""
+        turn = self.poses[:, 2 if self.planar else 3 :]
+        return bool((turn != turn[0]).any())
+
+    @property
+    def span(self) -> FloatArray:
+        """(2, 3) lowest and highest coordinates of the origin on its way [m]: it moves straight from pose to pose."""
+        places = self.poses[:, :3].copy()
+        if self.planar:
+            places[:, 2] = 0.0
+        return np.array([places.min(axis=0), places.max(axis=0)])
+
     def pieces(self) -> list[tuple[float, float]]:
         """Times of neighbouring poses."""
         when = self.times.tolist()
@@ -220,6 +234,26 @@ class AcceleratedMotion:
     def end(self) -> float:
         """The duration [s]."""
         return self.duration
+
+    @property
+    def turns(self) -> bool:
+        """Whether the body turns."""
+        return bool(self.angular_velocity.any() or self.angular_acceleration.any())
+
+    @property
+    def span(self) -> FloatArray:
+        """(2, 3) lowest and highest coordinates of the origin on its way [m], rounded outwards."""
+        # A coordinate is extreme at an end, or where it turns back: where v + a t = 0.  An error d of that time moves
+        # it by a d^2 / 2, less than the rounding of the sums.
+        speed, gain = self.velocity, self.acceleration
+        with np.errstate(all="ignore"):
+            back = np.where(gain == 0.0, 0.0, np.clip(-speed / gain, 0.0, self.duration))
+        when = np.array([np.zeros_like(speed), back, np.full_like(speed, self.duration)])
+        places = self.pose[: len(speed)] + when * (speed + 0.5 * when * gain)
+        off = PLACE_ROUNDING * self._sizes(self.duration)
+        out = np.zeros((2, 3))
+        out[:, : len(speed)] = places.min(axis=0) - off, places.max(axis=0) + off
+        return out
 
     def _sizes(self, until: float) -> float:
         """Sum of the magnitudes of all that places until a time are sums of."""

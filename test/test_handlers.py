@@ -19,7 +19,7 @@ from geomsrv.narrow_phase import relative_poses
 from geomsrv.queries import TIERS
 from geomsrv.ros import convert
 from geomsrv.ros.handlers import Handlers
-from geomsrv.turning_pairs import TIME_TOLERANCE
+from geomsrv.turning_pairs import TIME_TOLERANCE, core_of_solids
 from geomsrv.verify import verify_lines
 
 OK, BAD_REQUEST, UNSUPPORTED, NOT_AVAILABLE, NOT_ACTIVE, INTERNAL_ERROR = range(6)
@@ -695,7 +695,7 @@ BAD = [
     (
         "FirstContactAlong",
         {"id": "ball", "times": D([0.5, 1]), "poses": at((0, 0, 0), (1, 0, 0))},
-        r"times\[0\] must be 0, where the path begins: now; got 0.5",
+        r"times\[0\] must be 0, where the motion begins: now; got 0.5",
     ),
     (
         "FirstContactAlong",
@@ -1171,6 +1171,170 @@ def test_first_contact_along_a_path_says_what_it_cannot() -> None:
     assert got.status == OK and len(got.ids) == len(got.time) == 0
     got = Desk(effects__rotation=False).ask("FirstContactAlong", **along(id="box"))
     assert got.status == NOT_AVAILABLE and "effects.rotation" in got.message
+
+
+# --------------------------------------------------------------------------------------------- under acceleration
+
+STILL = [0.0] * 6
+
+
+def accelerated(pose, twist=STILL, acceleration=STILL, duration=4.0, **fields):
+    """A request of a motion of second order; a pose of three numbers is a place."""
+    pose = [*pose, 0, 0, 0, 1] if len(pose) == 3 else pose
+    return {
+        "times": D([0.0, duration]),
+        "poses": D(pose),
+        "twist": D(twist),
+        "acceleration": D(acceleration),
+        **fields,
+    }
+
+
+def test_acceleration_is_that_of_the_function() -> None:
+    """Bit for bit, thrown and spinning, past boxes at rest and hulls that move, as the scene places them."""
+    desk = Desk()
+    rng = np.random.default_rng(7)
+    hull, found = gs.Convex(rng.normal(size=(9, 3)) * 0.3), []
+    turn = np.array([0.1, 0.2, 0.3, 1.0]) / np.linalg.norm([0.1, 0.2, 0.3, 1.0])
+    places, velocity = rng.uniform([-1, -1, -1], [3, 1, 3], (30, 3)), (0.1, -0.2, 0.0)
+    add = [gs.SceneObject(f"box{i:02}", gs.Box([0.2, 0.3, 0.1]), (*places[i], *turn)) for i in range(15)]
+    add += [gs.SceneObject(f"hull{i}", hull, (*places[i], *turn), (*velocity, 0, 0, 0)) for i in range(15, 30)]
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=add))
+    world, body, axis = desk.engine.scene.world, gs.Box([0.5, 0.2, 0.1]), np.array([0.3, 0.2, 1.0])
+    start, twist, gain = [-2, -1, 0, *turn], [2, 1, 3, *2 * axis], [0, 0, -3, *-0.5 * axis]
+    got = desk.ask("FirstContactAlong", **accelerated(start, twist, gain, shape=shapes(body), ids=world.ids))
+    assert got.status == OK, got.message
+    motion = gs.AcceleratedMotion(
+        start,
+        twist[:3],
+        acceleration=gain[:3],
+        angular_velocity=twist[3:],
+        angular_acceleration=gain[3:],
+        duration=4.0,
+    )
+    for i, name in enumerate(world.ids):
+        if name.startswith("box"):
+            obstacle, drift = gs.Boxes.from_poses(world.poses[i], [[0.2, 0.3, 0.1]]), (0, 0, 0)
+        else:
+            obstacle, drift = gs.Polytopes(*core_of_solids(world, np.array([i]))), velocity
+        want = gs.first_contact_along(body, motion, obstacle, velocities=drift)
+        assert got.item_status[i] == want.status[0], name
+        for part in ("time", "time_lower", "time_upper"):
+            np.testing.assert_array_equal(getattr(got, part)[i], getattr(want, part)[0], f"{part} of {name}")
+        found.append(int(want.status[0]))
+    assert min(found.count(0), found.count(1)) >= 5
+    spared = dict(zip(got.cost.stages, got.cost.counts, strict=True))["boxes"]
+    assert 0 < spared < 30  # some keep clear of all of its way
+
+
+def test_acceleration_in_closed_form() -> None:
+    """A ball that falls, one that is thrown, and a box that brakes."""
+    desk = Desk()
+    ball, cube = gs.Sphere(0.25), gs.Box([0.5, 0.5, 0.5])
+    add = [
+        obj("floor", gs.Box([50, 50, 1]), (0, 0, -1)),
+        obj("top", gs.Box([0.1, 0.1, 0.1]), (4, 0, 30.3499)),
+        obj("over", gs.Box([0.1, 0.1, 0.1]), (4, 1, 30.3501)),
+        obj("near", cube, (-100, 0, 102.9999)),
+        obj("far", cube, (-100, 5, 103.0001)),
+    ]
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=add))
+    gravity = [0, 0, -9.81, 0, 0, 0]
+    got = desk.ask("FirstContactAlong", **accelerated((0, 0, 10), acceleration=gravity, shape=shapes(ball)))
+    when = math.sqrt(2 * 9.75 / 9.81)
+    assert got.status == OK and list(got.ids) == ["floor"] and got.item_status[0] == 1
+    assert got.time_lower[0] - EXPECTED_ROUNDED <= when <= got.time_upper[0] + EXPECTED_ROUNDED
+    assert list(got.normal) == pytest.approx([0, 0, -1]) and list(got.point) == pytest.approx([0, 0, 0], abs=1e-5)
+    # Up by v^2 / (2 g) = 20 m in 2 s: there, beyond the boxes of both ends, something is 0.1 mm lower or higher.
+    for y, name, status in ((0, "top", 1), (1, "over", 0)):
+        up = accelerated((0, y, 10), (2, 0, 20, 0, 0, 0), (0, 0, -10, 0, 0, 0), shape=shapes(ball), ids=[name])
+        got = desk.ask("FirstContactAlong", **up)
+        assert got.item_status.tolist() == [status], name
+        if status:
+            when = 2.0 - math.sqrt(2 * 1e-4 / 10)
+            assert got.time_lower[0] - EXPECTED_ROUNDED <= when <= got.time_upper[0] + EXPECTED_ROUNDED
+    # 2 s and 2 m to stand still, beside one wall and before it.
+    for y, name, status in ((0, "near", 1), (5, "far", 0)):
+        brake = accelerated((-100, y, 100), (0, 0, 2, 0, 0, 0), (0, 0, -1, 0, 0, 0), shape=shapes(cube), ids=[name])
+        got = desk.ask("FirstContactAlong", **brake)
+        assert got.item_status.tolist() == [status], name
+        if status:
+            when = 2.0 - math.sqrt(2 * 1e-4)
+            assert got.time_lower[0] - EXPECTED_ROUNDED <= when <= got.time_upper[0] + EXPECTED_ROUNDED
+
+
+def test_acceleration_in_the_plane() -> None:
+    """A rod that spins up from rest, turned a quarter to begin with, is at a right angle to that at sqrt(pi / b)."""
+    desk = Desk()
+    post = gs.Polygon([(-0.9, 0.0), (-0.9, -0.1), (-0.8, 0.0)])
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=[obj("post", post), obj("box", gs.Box([1, 1, 1]))]))
+    rod = shapes(gs.Polygon([(0, 0), (1, 0)]))
+    quarter = (0, 0, 0, 0, 0, math.sqrt(0.5), math.sqrt(0.5))
+    spin_up = accelerated(quarter, acceleration=(0, 0, 0, 0, 0, 2.0), shape=rod)
+    got = desk.ask("FirstContactAlong", **spin_up)
+    when = math.sqrt(math.pi / 2.0)
+    assert got.status == OK and list(got.ids) == ["post"] and got.item_status[0] in (1, 6)
+    assert got.time_lower[0] - EXPECTED_ROUNDED <= when <= got.time_upper[0] + EXPECTED_ROUNDED
+    refused = Desk(effects__rotation=False)
+    refused.engine.apply(gs.SceneUpdate(clear=True, add=[obj("post", post)]))
+    got = refused.ask("FirstContactAlong", **spin_up)
+    assert got.status == NOT_AVAILABLE and "effects.rotation" in got.message and is_empty(got)
+    straight = accelerated((-3, 0, 0), acceleration=(2.0, 0, 0, 0, 0, 0), shape=rod)
+    got = refused.ask("FirstContactAlong", **straight)
+    assert got.status == OK and got.time[0] == pytest.approx(math.sqrt(1.1), abs=2e-6)
+
+
+def test_acceleration_of_what_is_uncertain() -> None:
+    """A cube that starts off 2 m before another, each 0.05 m off at most, at a t^2 / 2."""
+    desk = Desk()
+    cube = gs.Box([0.5, 0.5, 0.5])
+    add = [obj("cube", cube, (9, 9, 9), uncertainty=0.05), obj("there", cube, (3, 0, 0), uncertainty=0.05)]
+    desk.engine.apply(gs.SceneUpdate(clear=True, add=add))
+    got = desk.ask("FirstContactAlong", **accelerated((0, 0, 0), acceleration=(1, 0, 0, 0, 0, 0), id="cube"))
+    assert got.status == OK and list(got.ids) == ["there"] and got.time[0] == pytest.approx(2.0, abs=2e-6)
+    assert got.time_lower[0] <= math.sqrt(2 * 1.9) <= got.time_lower[0] + LATE
+    assert math.sqrt(2 * 2.1) <= got.time_upper[0] + EXPECTED_ROUNDED
+
+
+ONE = [0, 0, 0, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"twist": STILL}, "twist and acceleration must hold 6 numbers each, or none; acceleration has 0"),
+        ({"acceleration": STILL}, "twist and acceleration must hold 6 numbers each, or none; twist has 0"),
+        ({"twist": STILL[:5], "acceleration": STILL}, "twist has 5"),
+        ({"twist": [0, 0, 0, math.nan, 0, 0], "acceleration": STILL}, "twist[3] is nan, must be finite"),
+        ({"twist": STILL, "acceleration": [math.inf, 0, 0, 0, 0, 0]}, "acceleration[0] is inf, must be finite"),
+        ({"times": [0, 1, 2]}, "times must be 0 and the duration, where a twist is given; got 3"),
+        ({"times": []}, "times must be 0 and the duration, where a twist is given; got 0"),
+        ({"times": [1, 2]}, "times[0] must be 0, where the motion begins: now; got 1"),
+        ({"times": [0, 0]}, "times[1] must be > 0, the duration; got 0"),
+        ({"times": [0, math.inf]}, "times[1] is inf, must be finite"),
+        ({"poses": []}, "poses must be the one at the start, where a twist is given; got 0"),
+        ({"poses": [*ONE, *ONE]}, "poses must be the one at the start, where a twist is given; got 2"),
+        ({"poses": ONE[:6]}, "poses must hold 7 numbers per item, got 6 numbers"),
+        ({"poses": [0, 0, 0, 0, 0, 0, 2]}, "poses[0] quaternion x y z w must have norm 1, got 2"),
+        (
+            {"twist": [0, 0, 0, 1, 0, 0], "acceleration": [0, 0, 0, 0, 1, 0]},
+            "twist[3:], acceleration[3:]: angular_acceleration must be about the axis of angular_velocity",
+        ),
+        ({"flat": True, "twist": [0, 0, 0, 0, 1, 0]}, "twist[2:5] must be 0: a polygon stays in the plane z = 0"),
+        ({"flat": True, "acceleration": [0, 0, -9.81, 0, 0, 0]}, "acceleration[2:5] must be 0: a polygon stays"),
+        ({"flat": True, "poses": [0, 0, 1, 0, 0, 0, 1]}, "poses[0]: a polygon lies in the plane z = 0"),
+        ({"flat": True, "poses": [0, 0, 0, 1, 0, 0, 0]}, "its pose must turn about z only"),
+    ],
+)
+def test_faults_of_accelerations_are_named(fields, text) -> None:
+    fields = dict(fields)
+    body = SQUARE if fields.pop("flat", False) else gs.Sphere(0.5)
+    alone = ("twist" in fields) != ("acceleration" in fields) and "must hold 6 numbers each" in text
+    whole = {} if alone else {"twist": STILL, "acceleration": STILL}
+    given = {"times": [0.0, 1.0], "poses": ONE, **whole, **fields}
+    got = Desk().ask("FirstContactAlong", shape=shapes(body), **{name: D(value) for name, value in given.items()})
+    assert got.status == BAD_REQUEST and text in got.message, got.message
+    assert is_empty(got)
 
 
 # ---------------------------------------------------------------------------------------------------- cross-check

@@ -228,6 +228,28 @@ def test_first_contact_along_a_path(client) -> None:
     assert got.cost.accuracy == "float64" and got.scene_version > 0
 
 
+def test_first_contact_under_acceleration(client) -> None:
+    """A ball that is thrown, and meets a shelf only on top of its way: after 1 s it is 5 m higher."""
+    shelf = body("shelf", gs.Box([5.0, 5.0, 0.1]), (101, 0, 4.6))
+    client.call(srv.ApplyScene, "apply_scene", update=msg.SceneUpdate(add=[shelf]))
+    motion = {
+        "shape": inline(gs.Sphere(0.25)),
+        "times": convert.doubles([0.0, 2.0]),
+        "poses": convert.doubles([100, 0, 0, 0, 0, 0, 1]),
+        "twist": convert.doubles([1, 0, 10, 0, 0, 0]),
+    }
+    gravity = convert.doubles([0, 0, -10, 0, 0, 0])
+    got = client.call(srv.FirstContactAlong, "first_contact_along", **motion, acceleration=gravity)
+    assert got.status == got.OK and list(got.ids) == ["shelf"] and list(got.item_status) == [got.WILL_TOUCH]
+    rounded = 1e-9  # the root below, far less [s]
+    # The ball's top is at the lower side of the shelf, 4.5 m up, when its middle is 0.75 m below the top of its way.
+    when = 1.0 - math.sqrt(2 * 0.75 / 10)
+    assert got.time_lower[0] - rounded <= when <= got.time_upper[0] + rounded
+    assert list(got.normal) == pytest.approx([0, 0, 1], abs=1e-6)
+    got = client.call(srv.FirstContactAlong, "first_contact_along", **motion)
+    assert got.status == got.BAD_REQUEST and "acceleration has 0" in got.message and len(got.ids) == 0
+
+
 def test_a_million_boxes(client) -> None:
     rng = np.random.default_rng(1)
     camera = gs.Frustum([0, 0, 0], np.eye(3), 0.5, 0.5, 1.0, 50.0)

@@ -265,6 +265,31 @@ def test_places_that_cancel(rng):
     assert missed < 25
 
 
+@pytest.mark.parametrize("flat", [True, False], ids=["plane", "space"])
+def test_span_is_around_the_way_of_the_origin(rng, flat):
+    """As narrow as it can be, turning points among them, and that of a path, too."""
+    dimension, turned_back = 2 if flat else 3, 0
+    for _ in range(50):
+        pose = np.zeros(3 if flat else 7)
+        pose[:dimension], pose[-1] = rng.normal(size=dimension), 1.0
+        velocity, acceleration = rng.normal(size=(2, dimension)) * rng.choice([0.0, 1.0], size=(2, dimension))
+        motion = gs.AcceleratedMotion(pose, velocity, acceleration=acceleration, duration=rng.uniform(0.5, 4.0))
+        for way in (motion, random_path(rng, flat, 5)):
+            when = np.linspace(way.start, way.end, 1001)
+            places = np.array([placed(np.zeros((1, dimension)), way, t)[0] for t in when])
+            low, high = way.span[:, :dimension]
+            assert (low <= places.min(axis=0) + NEAR).all() and (places.max(axis=0) <= high + NEAR).all()
+            # Between two looks a parabola, or the corner of a path, is a little farther out.
+            np.testing.assert_allclose(way.span[:, :dimension], [places.min(axis=0), places.max(axis=0)], atol=0.05)
+            assert dimension == 3 or not way.span[:, 2].any()
+        ends = np.array([placed(np.zeros((1, dimension)), motion, t)[0] for t in (0.0, motion.end)])
+        turned_back += (
+            (motion.span[1][:dimension] > ends.max(axis=0) + 0.01)
+            | (motion.span[0][:dimension] < ends.min(axis=0) - 0.01)
+        ).any()
+    assert turned_back >= 5
+
+
 def test_start_is_named():
     path = gs.Trajectory([5.0, 6.0], [[0, 0, 0], [1, 0, 0]])
     walls = gs.Polygons.from_list([[(x, -1), (x, 1)] for x in (0.25, 0.5, 0.75)])

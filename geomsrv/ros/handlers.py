@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _validate, queries
-from geomsrv.along_pairs import contacts_along, path_of
+from geomsrv.along_pairs import contacts_along, motion_of
 from geomsrv.answers import ContactStatus, Cost, DistanceStatus, gather
 from geomsrv.effects import OFF, ON
 from geomsrv.engine import Engine
@@ -446,18 +446,17 @@ class Handlers:
         self._allowed("first_contact")
         world = self.engine.scene.world
         body, off, row = self._body(request, world)
-        path = path_of(
-            convert.floats(request.times), convert.rows(request.poses, "poses", 7), isinstance(body, Polygon)
-        )
-        turn = path.poses[:, 2 if path.planar else 3 :]
-        if (turn != turn[0]).any():
+        flat = isinstance(body, Polygon)
+        rates = (convert.floats(request.twist), convert.floats(request.acceleration))
+        path = motion_of(convert.floats(request.times), convert.rows(request.poses, "poses", 7), *rates, flat)
+        if path.turns:
             self._allowed("rotation")
         if request.ids:
             rows = np.array(_rows_of(world, request.ids, "ids"), dtype=np.int64)
             if len(same := np.flatnonzero(rows == row)):
                 raise GeometryError(f"ids[{same[0]}] is {request.id!r}, the body itself")
         else:
-            rows = _others_of(world, row, isinstance(body, Polygon))
+            rows = _others_of(world, row, flat)
         answer = contacts_along(world, body, off, path, rows, request.tolerance or TIME_TOLERANCE)
         order: IntArray = np.arange(len(rows))
         if not request.ids:
