@@ -2,40 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """First contact of a body on its way with objects of a scene: `first_contact_along`, of objects where they are.
 
-Of spheres and capsules the cores are followed, which are in contact when they are as near as the radii.  What the body
-and an object may be off by widens the interval, as it does for all pairs of a scene.
+Each piece of the way is the query for objects that turn, of the body and of the objects where they are by then.  What
+they may be off by widens the interval, as it does for all pairs of a scene.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geomsrv import _validate
-from geomsrv.answers import BoolArray, Bounded, ByteArray, ContactStatus, Cost, FloatArray, IntArray, gather
+from geomsrv.answers import BoolArray, Bounded, ByteArray, ContactStatus, Cost, FloatArray, IntArray
 from geomsrv.broad_phase import AABB_ROUNDING, boxes_swept
 from geomsrv.errors import GeometryError
-from geomsrv.narrow_phase import placed_boxes
-from geomsrv.placement import laid_flat
-from geomsrv.shapes import Box, Boxes, Polygon, Polygons, Polytopes, Shape, vertices_of
-from geomsrv.trajectory import AcceleratedMotion, Motion, Search, Trajectory
-from geomsrv.turning_pairs import CAPSULE_ROUNDING, core_of_solids, radii
+from geomsrv.narrow_phase import Unsupported, unpredictable
+from geomsrv.placement import IDENTITY, laid_flat
+from geomsrv.shapes import Shape
+from geomsrv.trajectory import AcceleratedMotion, Look, Motion, Piece, Search, Trajectory, turned
+from geomsrv.turning_pairs import SWITCHED_OFF, Question, ask_followed, followed_in_pairs, slack_of
 from geomsrv.world import ShapeTable, World
 
 __all__ = ["AlongContacts", "contacts_along", "motion_of"]
 
-KINDS = (
-    "box",
-    "capsule",
-    "convex",
-    "sphere",
-)  #: of solids that are followed, points, segments and triangles being hulls
-
 NO_KIND = "first contact along a path ({}) is unsupported"
-NO_TURN = "first contact along a path with what turns ({}) is unsupported"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +117,9 @@ def _in_plane(poses: FloatArray) -> FloatArray:
 
 
 def contacts_along(
-    world: World, body: Shape, off: float, path: Motion, rows: IntArray, tolerance: float
+    world: World, body: Shape, off: float, path: Motion, rows: IntArray, tolerance: float, rotation: bool = True
 ) -> AlongContacts:
-    """When a body on a path first touches the objects in some rows of a world, which keep their velocities.
+    """When a body on a path first touches the objects in some rows of a world, which keep their twists.
 
     Parameters
     ----------
@@ -141,39 +132,34 @@ def contacts_along(
     rows : (n,) int64
     tolerance : float
         Widest interval of WILL_TOUCH [s].
+    rotation : bool
+        Whether to follow objects that turn.
     """
     begin = time.perf_counter_ns()
     step = _validate.scalar(tolerance, "tolerance", positive=True)
-    count = len(rows)
-    status = np.full(count, ContactStatus.NEVER, np.uint8)
-    nothing = np.full(count, np.nan)
-    lower, upper, now = nothing.copy(), nothing.copy(), nothing.copy()
-    normal, point = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-    known, message = _followed(world, body, rows)
-    status[~known] = ContactStatus.UNSUPPORTED
-    table = ShapeTable.of([body])
-    clear = _clear(world, table, off, path, rows)
+    both = _beside(world, body, rows)
+    known, message = _followed(both, rotation)
+    clear = _clear(world, both, off, path, rows)
     counts = {"pieces": 0, "boxes": int((known & clear).sum())}
-    boxes = world.table.boxes[world.shape[rows]]
-    for part in (known & ~clear & boxes, known & ~clear & ~boxes):
-        chosen = np.flatnonzero(part)
-        if not len(chosen):
-            continue
-        mine = rows[chosen]
-        doubt = np.column_stack([world.uncertainty[mine] + off, world.velocity_uncertainty[mine]])
-        found = may = _search(world, table, path, mine, step, 0.0 * doubt)
+    status = np.where(known, ContactStatus.NEVER, ContactStatus.UNSUPPORTED).astype(np.uint8)
+    lower, upper, now = np.full((3, len(rows)), np.nan)
+    normal, point = np.full((2, len(rows), 3), np.nan)
+    chosen = np.flatnonzero(known & ~clear)
+    if len(chosen):
+        near = _beside(world, body, rows[chosen])
+        doubt = np.column_stack([near.uncertainty[1:] + off, near.velocity_uncertainty[1:]])
+        found = may = _InScene(near, path, step, 0.0 * doubt)
+        found.run()
         if doubt.any():
-            may = _search(world, table, path, mine, step, doubt)
+            may = _InScene(near, path, step, doubt)
+            may.run()
             counts["pieces"] += may.looked_at
         counts["pieces"] += found.looked_at
         never, vague = found.status == ContactStatus.NEVER, may.status == ContactStatus.NEVER
         status[chosen], now[chosen] = found.status, found.lower
         lower[chosen] = np.where(never, may.lower, np.fmin(may.lower, found.lower))
         upper[chosen] = np.where(vague, np.nan, np.where(never, np.inf, may.upper))
-        # Points are those of the cores.
-        shift = 0.5 * (table.round[0] * _is_round(table)[0] - radii(world)[mine])
-        normal[chosen] = found.normal
-        point[chosen] = found.point + shift[:, None] * np.nan_to_num(found.normal)
+        normal[chosen], point[chosen] = found.normal, found.point
     return AlongContacts(
         status=status,
         time=now,
@@ -186,72 +172,107 @@ def contacts_along(
     )
 
 
-def _followed(world: World, body: Shape, rows: IntArray) -> tuple[BoolArray, str]:
+def _beside(world: World, body: Shape, rows: IntArray) -> World:
+    """The body, and after it the objects in some rows; where the body is, and what it is off by, is said elsewhere."""
+    shapes, which = np.unique(world.shape[rows], return_inverse=True)
+    mine: IntArray = np.concatenate([[-1], rows])
+    first = mine < 0
+
+    def column(values: FloatArray, of_body: FloatArray | float) -> FloatArray:
+        out = values[mine] if len(world) else np.zeros((len(mine), *values.shape[1:]))
+        out[first] = of_body
+        return out
+
+    return replace(
+        World.empty(),
+        ids=("", *(world.ids[row] for row in rows.tolist())),
+        table=ShapeTable.of([body, *(world.table.shapes[k] for k in shapes.tolist())], world.table),
+        shape=np.concatenate([[0], which + 1]),
+        uncertainty=column(world.uncertainty, 0.0),
+        velocity_uncertainty=column(world.velocity_uncertainty, 0.0),
+        motion_faults={
+            k: world.motion_faults[row] for k, row in enumerate(mine.tolist()) if row in world.motion_faults
+        },
+        poses=column(world.poses, IDENTITY),
+        twists=column(world.twists, 0.0),
+    )
+
+
+def _pairs(count: int) -> IntArray:
+    """(count, 2) the body with every other object."""
+    return np.column_stack([np.zeros(count, np.int64), np.arange(1, count + 1)])
+
+
+def _followed(both: World, rotation: bool) -> tuple[BoolArray, str]:
     """(n,) bool: objects that are followed, and why others are not."""
-    flat = isinstance(body, Polygon)
-    kinds = np.array([_kind(shape) for shape in world.table.shapes], dtype=object)[world.shape[rows]]
-    fitting = world.planar[rows] if flat else np.isin(kinds, KINDS)
-    fitting &= flat or _kind(body) in KINDS
-    turning = world.turns[rows]
-    reasons = []
-    for part, text in ((~fitting, NO_KIND), (fitting & turning, NO_TURN)):
-        pairs = sorted({"-".join(sorted((_kind(body), kind))) for kind in kinds[part].tolist()})
-        reasons += [text.format(pair) for pair in pairs]
-    return fitting & ~turning, "; ".join(reasons)
+    pairs = _pairs(len(both) - 1)
+    unbounded = both.table.unbounded[both.shape[0]]
+    fitting = followed_in_pairs(both, pairs) & (both.planar[1:] == both.planar[0]) & ~unbounded
+    turning = fitting & both.turns[1:] & (not rotation)
+    reasons = unpredictable(both, Unsupported.of_kinds(both, pairs[~fitting], NO_KIND)).reason.tolist()
+    reasons += [SWITCHED_OFF] * bool(turning.any())
+    return fitting & ~turning, "; ".join(dict.fromkeys(reasons))
 
 
-def _kind(shape: object) -> str:
-    """Points, segments and triangles are hulls; a frustum, whose corners are rounded, is none here."""
-    kind: str = shape.kind  # type: ignore[attr-defined]
-    return "convex" if kind in ("point", "segment", "triangle") else kind
-
-
-def _is_round(table: ShapeTable) -> NDArray[np.bool_]:
-    return np.array([shape.kind in ("sphere", "capsule") for shape in table.shapes])
-
-
-def _clear(world: World, table: ShapeTable, off: float, path: Motion, rows: IntArray) -> BoolArray:
+def _clear(world: World, both: World, off: float, path: Motion, rows: IntArray) -> BoolArray:
     """(n,) bool: objects whose swept boxes keep clear of a box around the path, and so never meet the body."""
     if not len(rows):
         return np.zeros(0, np.bool_)
     swept = boxes_swept(world, path.end, rows)
     span = path.span
     # However it turns, the body is in the ball around its origin.
-    reach = float(table.reach[0]) + off
+    reach = float(both.table.reach[0]) + off
     reach += AABB_ROUNDING * (reach + float(np.abs(span).max(axis=0).sum()))
     clear: BoolArray = ((swept.upper < span[0] - reach) | (swept.lower > span[1] + reach)).any(axis=1)
     return clear
 
 
-def _search(
-    world: World, table: ShapeTable, path: Motion, rows: IntArray, tolerance: float, doubt: FloatArray
-) -> Search:
-    body = table.shapes[0]
-    obstacles: Polygons | Boxes | Polytopes
-    if path.planar:
-        obstacles = Polygons(*gather(*world.rings, rows))
-    elif world.table.boxes[world.shape[rows[0]]]:
-        obstacles = Boxes(*placed_boxes(world, rows))
-    else:
-        obstacles = Polytopes(*core_of_solids(world, rows))
-    margin = np.zeros(len(rows)) if path.planar else radii(world)[rows] + table.round[0] * _is_round(table)[0]
-    size = np.abs(world.poses[rows, :3]).sum(axis=1) + world.table.reach[world.shape[rows]]
-    # Ends of capsules are placed, and radii added.
-    rounding = CAPSULE_ROUNDING * (margin + np.where(margin > 0.0, size, 0.0))
-    room = np.column_stack([margin, doubt[:, 0] + rounding, doubt[:, 1]])
-    drift = np.ascontiguousarray(world.twists[rows, : 2 if path.planar else 3])
-    search = Search(_core_vertices(body, table), path, obstacles, drift, tolerance, room)
-    search.run()
-    return search
+class _InScene(Search):
+    """A body, the first object of a world, and the others, placed anew for every piece."""
+
+    def __init__(self, world: World, path: Motion, step: float, doubt: FloatArray) -> None:
+        self._world = world
+        place, reach = np.abs(world.poses[1:, :3]).sum(axis=1), world.table.reach[world.shape]
+        speed, spin = (np.linalg.norm(part, axis=1) for part in np.split(world.twists[1:], 2, axis=1))
+        # Of a half space that turns no more counts than where the body may be.
+        around = float(np.abs(path.span).max(axis=0).sum()) + reach[0] + place + path.end * speed
+        lever = np.where(np.isfinite(reach[1:]), reach[1:], around)
+        super().__init__(path, float(reach[0]), place + lever, speed + spin * lever, step, doubt)
+
+    def look(self, rows: IntArray, piece: Piece, since: float, slack: FloatArray) -> Look:
+        """The query for objects that turn, of those that come near."""
+        length, mine = piece.end - piece.start, np.concatenate([[0], rows + 1])
+        poses, twists, shape = self._world.poses[mine], self._world.twists[mine], self._world.shape[mine]
+        poses[:, :3] += since * twists[:, :3]
+        if len(spins := np.flatnonzero(twists[:, 3:].any(axis=1))):
+            poses[spins, 3:] = turned(poses[spins, 3:], since * twists[spins, 3:])
+        poses[0], twists[0] = [*piece.place, *piece.turn], [*piece.linear, *piece.angular]
+        ids, pairs = ("",) * len(mine), _pairs(len(rows))
+        now = replace(World.empty(), ids=ids, table=self._world.table, shape=shape, poses=poses, twists=twists)
+        room = slack + slack_of(now, pairs, 0.0)
+        near = _come_near(now, length, room)
+        self.looked_at += int(near.sum())
+        status = np.full(len(rows), ContactStatus.NEVER, np.uint8)
+        lower, upper = np.full((2, len(rows)), np.nan)
+        normal, point = np.full((2, len(rows), 3), np.nan)
+        if near.any():
+            question = Question(length, tolerance=0.5 * self._step, contact_set=False)
+            found = ask_followed(now, pairs[near], question, room[near])
+            status[near], lower[near], upper[near], normal[near], sets = found
+            for k, points in zip(np.flatnonzero(near).tolist(), sets, strict=True):
+                point[k] = np.nan if points is None else points[0]
+        return status, lower, upper, normal, point
 
 
-def _core_vertices(body: object, table: ShapeTable) -> FloatArray:
-    """(m, 3) vertices of a body, or of the core of a round one, in its own frame."""
-    if isinstance(body, Polygon):
-        return np.column_stack([body.vertices, np.zeros(len(body.vertices))])
-    if isinstance(body, Box):
-        return vertices_of(body)
-    if _is_round(table)[0]:
-        half = float(table.packed.params[0, 1])
-        return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]][: 2 if half else 1])
-    return table.packed.vertices
+def _come_near(world: World, length: float, room: FloatArray) -> BoolArray:
+    """(n,) bool: objects whose balls, in which they are however they turn, may meet that of the first within a time."""
+    reach = world.table.reach[world.shape]
+    way, speed = world.poses[1:, :3] - world.poses[0, :3], world.twists[1:, :3] - world.twists[0, :3]
+    with np.errstate(all="ignore"):
+        # Where they are nearest, or a little later or earlier: that makes no more than 4 u of the way.
+        nearest = np.clip(-(way * speed).sum(axis=1) / (speed * speed).sum(axis=1), 0.0, length)
+        nearest = np.where(speed.any(axis=1), nearest, 0.0)
+        apart = np.linalg.norm(way + nearest[:, None] * speed, axis=1)
+        # The room is also for what places are rounded by, and so are these.
+        near: BoolArray = ~(apart > reach[0] + reach[1:] + room[:, 1] + length * room[:, 2])
+    return near

@@ -14,7 +14,7 @@ from geomsrv import _validate
 from geomsrv.answers import BoolArray, FloatArray
 from geomsrv.errors import GeometryError
 
-__all__ = ["IDENTITY", "in_fixed_frame", "laid_flat", "numbers", "settled"]
+__all__ = ["IDENTITY", "in_fixed_frame", "laid_flat", "numbers", "product_of", "settled"]
 
 # A polygon's frame may be tilted out of the plane by this [rad / 2], and its origin off the plane by this
 # share of its distance, and is laid flat: rotations composed from several are no nearer to the plane than
@@ -110,7 +110,7 @@ def in_fixed_frame(
             continue
         turn = _validate.rotation_matrices(pose[:, 3:])[0]
         poses[rows, :3] = poses[rows, :3] @ turn.T + pose[0, :3]
-        poses[rows, 3:] = _product(pose[0, 3:], poses[rows, 3:])
+        poses[rows, 3:] = product_of(pose[0, 3:], poses[rows, 3:])
         twists[rows, :3] = twists[rows, :3] @ turn.T
         twists[rows, 3:] = twists[rows, 3:] @ turn.T
     return poses, twists, faults
@@ -122,9 +122,9 @@ def _pose_of(frame: str, fixed_frame: str, transforms: Callable[[str], ArrayLike
     return _validate.poses(_validate.floats(transforms(frame), "transform", (7,)), "transform")
 
 
-def _product(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Quaternion product of one a (4,) and many b (n, 4), x y z w."""
-    ax, ay, az, aw = a
+def product_of(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(n, 4) quaternion products, x y z w, of many b (n, 4) and as many a, or one (4,)."""
+    ax, ay, az, aw = a.T
     bx, by, bz, bw = b.T
     return np.column_stack(
         [

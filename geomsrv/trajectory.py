@@ -23,16 +23,17 @@ from numpy.typing import ArrayLike
 from geomsrv import _core, _validate
 from geomsrv.answers import BoolArray, ByteArray, CollisionTimes, ContactStatus, Cost, FloatArray, IntArray, gather
 from geomsrv.errors import GeometryError
+from geomsrv.placement import product_of
 from geomsrv.shapes import Box, Boxes, Convex, Polygon, Polygons, Polytopes, freeze, vertices_of
 from geomsrv.world import ROUNDOFF
 
-__all__ = ["AcceleratedMotion", "Search", "Trajectory", "first_contact_along"]
+__all__ = ["AcceleratedMotion", "Look", "Motion", "Piece", "Search", "Trajectory", "first_contact_along", "turned"]
 
-# Where a piece puts a point, relative to the coordinates involved: the matrix of a quaternion that is normalised to
-# an ulp is good to 8 u in each entry, 24 u as a matrix; the twist of a piece is found from its ends by a quotient
-# each, the angle by an arc tangent as well: 16 u of it; positions are sums of two numbers.  So 24 u and 16 u of the
-# angle of the reach, and a few of the places.
-PLACE_ROUNDING = 32.0 * ROUNDOFF
+# Where a piece puts a point, relative to the coordinates involved.  An orientation that is composed takes the half of
+# an angle, its sine and cosine, a product of quaternions that is normalised, and the matrix of it: 40 u of the reach.
+# The twist of a piece is found from its ends by a quotient each, the angle by an arc tangent as well: 16 u of it;
+# positions are sums of two or three numbers.  Rounded up; the same goes for obstacles that are placed anew.
+PLACE_ROUNDING = 64.0 * ROUNDOFF
 
 # Pieces are halved until they are this small a part of the time interval asked for; what cannot be told then never can.
 FINEST = 2.0**-3
@@ -43,7 +44,7 @@ class Piece(NamedTuple):
 
     start: float  #: [s]
     end: float
-    turn: FloatArray  #: (3, 3) rotation at the start
+    turn: FloatArray  #: (4,) unit quaternion x y z w of the body at the start
     place: FloatArray  #: (3,) origin of the body at the start [m]
     linear: FloatArray  #: (3,) [m/s]
     angular: FloatArray  #: (3,) [rad/s]
@@ -142,7 +143,7 @@ class Trajectory:
             linear = np.array([there[0] - here[0], there[1] - here[1], 0.0]) / duration
             angular, turn = np.array([0.0, 0.0, there[2] - here[2]]) / duration, _about_z(here[2])
         else:
-            place, turn = here[:3], _validate.rotation_matrices(here[None, 3:])[0]
+            place, turn = here[:3], here[3:]
             linear, angular = (there[:3] - here[:3]) / duration, _rotation_between(here[3:], there[3:]) / duration
         sizes = float(np.abs(place).sum() + duration * np.abs(linear).sum())
         angles = duration * float(np.linalg.norm(angular))
@@ -278,7 +279,7 @@ class AcceleratedMotion:
         if self.planar:
             turn, place, linear = _about_z(self.pose[2] + angle[2]), np.append(place, 0.0), np.append(linear, 0.0)
         else:
-            turn = _about(angle) @ _validate.rotation_matrices(self.pose[None, 3:])[0]
+            turn = turned(self.pose[None, 3:], angle)[0]
         gain, rate, gain_about = (
             float(np.linalg.norm(x)) for x in (self.acceleration, self.angular_velocity, self.angular_acceleration)
         )
@@ -287,6 +288,8 @@ class AcceleratedMotion:
 
 
 Motion = Trajectory | AcceleratedMotion
+
+Look = tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]  #: status, lower, upper, normal, point
 
 
 def first_contact_along(
@@ -349,7 +352,7 @@ def first_contact_along(
         names = " or ".join(kind.__name__ for kind in kinds)
         raise GeometryError(f"obstacles must be {names} for such a motion, got {type(obstacles).__name__}")
     drift = _validate.velocities(velocities, len(obstacles), 2 if motion.planar else 3)
-    search = Search(vertices, motion, obstacles, drift, step)
+    search = _Listed(vertices, motion, obstacles, drift, step)
     search.run()
     status, lower, upper = search.status, search.lower, search.upper
     certain = (status < ContactStatus.UNSUPPORTED) & ((status != ContactStatus.TOUCHING) | (upper == motion.start))
@@ -366,33 +369,38 @@ def first_contact_along(
 class Search:
     """Obstacle by obstacle, the first piece with a contact, halved until it can be told.
 
-    `room` (n, 3) is, for each obstacle, the margin [m] up to which the bodies are in contact, and what they may be off
-    by in place [m] and velocity [m/s]: the answer holds for all bodies within.
+    What is asked of a piece, and of which obstacles, is for those to say that have them.
+
+    Parameters
+    ----------
+    motion : Trajectory or AcceleratedMotion
+    reach : float
+        Of the body, from its origin [m].
+    far, speed : (n,) float64
+        For each obstacle the sum of all that places on it are sums of at the start [m], and how fast they grow [m/s].
+    step : float
+        Tolerance [s].
+    doubt : (n, 2) float64
+        What the bodies may be off by in place [m] and velocity [m/s]: the answer holds for all bodies within.
     """
 
     def __init__(
-        self,
-        vertices: FloatArray,
-        motion: Motion,
-        obstacles: Polygons | Boxes | Polytopes,
-        drift: FloatArray,
-        step: float,
-        room: FloatArray | None = None,
+        self, motion: Motion, reach: float, far: FloatArray, speed: FloatArray, step: float, doubt: FloatArray
     ) -> None:
-        self._vertices, self._motion, self._drift, self._step = vertices, motion, drift, step
-        self._reach = float(np.linalg.norm(vertices, axis=1).max())
-        self._obstacles = obstacles
-        count = len(obstacles)
-        self._far = np.zeros(count)  # of each alone, so that no answer depends on what else is asked about
-        if isinstance(obstacles, Boxes):
-            self._far += np.abs(obstacles.center).sum(axis=1) + np.linalg.norm(obstacles.half_extents, axis=1)
-        elif count:
-            self._far += np.maximum.reduceat(np.abs(obstacles.vertices).sum(axis=1), obstacles.offsets[:-1])
+        self._motion, self._reach, self._far, self._speed = motion, reach, far, speed
+        self._step, self._doubt = step, doubt
+        count = len(far)
         self.status = np.full(count, ContactStatus.NEVER, np.uint8)
         self.lower, self.upper = np.full(count, np.nan), np.full(count, np.nan)
         self.normal, self.point = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-        self._room = np.zeros((count, 3)) if room is None else room
         self.looked_at = 0
+
+    def look(self, rows: IntArray, piece: Piece, since: float, slack: FloatArray) -> Look:
+        """What a piece that begins `since` seconds after the motion has with obstacles in some rows, in its own time.
+
+        The time is found to half the tolerance; slack (k, 3) is what the engine's kernel for bodies that turn takes.
+        """
+        raise NotImplementedError
 
     def run(self) -> None:
         """Find the status of every obstacle, its times, and normal and point at the earlier one."""
@@ -442,23 +450,15 @@ class Search:
         self, rows: IntArray, piece: Piece
     ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
         """The engine's answer on a piece, in times of the motion, and whether it is as fine as it can be."""
-        self.looked_at += len(rows)
-        flat, length = self._motion.planar, piece.end - piece.start
-        placed = self._vertices @ piece.turn.T + piece.place
-        since = piece.start - self._motion.start
-        body = (placed[:, :2].copy() if flat else placed, np.array([0, len(placed)]))
-        motion = np.concatenate([piece.linear, piece.angular, piece.place])[None]
-        others, motions = self._others(rows, since)
+        length, since = piece.end - piece.start, piece.start - self._motion.start
         rounding = PLACE_ROUNDING * (
-            self._reach * (1.0 + piece.angles)
-            + piece.sizes
-            + self._far[rows]
-            + np.abs(self._drift).max(axis=1)[rows if len(self._drift) > 1 else 0] * (since + length)
+            self._reach * (1.0 + piece.angles) + piece.sizes + self._far[rows] + self._speed[rows] * (since + length)
         )
         stray = piece.straying + piece.leaning * self._reach
-        slack = self._room[rows]
-        slack[:, 1] += rounding + stray + since * (1.0 + PLACE_ROUNDING) * slack[:, 2]
-        found = _core.first_contact_turning(body, others, motion, motions, length, 0.5 * self._step, slack)
+        doubt, drift = self._doubt[rows].T
+        off = doubt + since * (1.0 + PLACE_ROUNDING) * drift + rounding + stray
+        slack = np.column_stack([np.zeros(len(rows)), off, drift])
+        found = self.look(rows, piece, since, slack)
         shift = np.where(np.isnan(found[1]), 0.0, piece.start)
         # Rounding of the sum; the piece's own ends are exact.
         lower = np.maximum(np.nextafter(found[1] + shift, -np.inf), piece.start)
@@ -467,9 +467,44 @@ class Search:
         fine = (stray <= rounding) | (length <= FINEST * self._step)
         return found[0], lower, upper, found[3], found[4], fine
 
+
+class _Listed(Search):
+    """Obstacles in a batch, and a body by its vertices."""
+
+    def __init__(
+        self,
+        vertices: FloatArray,
+        motion: Motion,
+        obstacles: Polygons | Boxes | Polytopes,
+        drift: FloatArray,
+        step: float,
+    ) -> None:
+        self._vertices, self._obstacles = vertices, obstacles
+        count = len(obstacles)
+        self._drift = np.broadcast_to(drift, (count, drift.shape[1]))
+        far = np.zeros(count)  # of each alone, so that no answer depends on what else is asked about
+        if isinstance(obstacles, Boxes):
+            far += np.abs(obstacles.center).sum(axis=1) + np.linalg.norm(obstacles.half_extents, axis=1)
+        elif count:
+            far += np.maximum.reduceat(np.abs(obstacles.vertices).sum(axis=1), obstacles.offsets[:-1])
+        reach = float(np.linalg.norm(vertices, axis=1).max())
+        super().__init__(motion, reach, far, np.abs(self._drift).max(axis=1), step, np.zeros((count, 2)))
+
+    def look(self, rows: IntArray, piece: Piece, since: float, slack: FloatArray) -> Look:
+        """The query for bodies that turn."""
+        self.looked_at += len(rows)
+        placed = self._vertices @ _validate.rotation_matrices(piece.turn[None])[0].T + piece.place
+        body = (placed[:, :2].copy() if self._motion.planar else placed, np.array([0, len(placed)]))
+        motion = np.concatenate([piece.linear, piece.angular, piece.place])[None]
+        others, motions = self._others(rows, since)
+        found = _core.first_contact_turning(
+            body, others, motion, motions, piece.end - piece.start, 0.5 * self._step, slack
+        )
+        return found[:5]
+
     def _others(self, rows: IntArray, since: float) -> tuple[tuple[FloatArray | IntArray, ...], FloatArray]:
         """The obstacles of some rows after a while, and their motions."""
-        drift = self._drift[rows if len(self._drift) > 1 else np.zeros(len(rows), np.int64)]
+        drift = self._drift[rows]
         motions = np.zeros((len(rows), 9))
         motions[:, : drift.shape[1]] = drift
         shift = since * drift
@@ -495,18 +530,17 @@ def _vertices(body: Polygon | Box | Convex, flat: bool) -> FloatArray:
     return vertices_of(body)
 
 
+def turned(quaternions: FloatArray, angles: FloatArray) -> FloatArray:
+    """(n, 4) orientations x y z w after rotations about vectors, (n, 3) or one for all, by their lengths [rad]."""
+    size = np.linalg.norm(angles, axis=-1, keepdims=True)
+    axis = angles / np.where(size > 0.0, size, 1.0)
+    out = product_of(np.concatenate([np.sin(0.5 * size) * axis, np.cos(0.5 * size)], axis=-1), quaternions)
+    unit: FloatArray = out / np.linalg.norm(out, axis=1, keepdims=True)
+    return unit
+
+
 def _about_z(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _about(angle: FloatArray) -> FloatArray:
-    """Rotation about a vector by its length."""
-    size = float(np.linalg.norm(angle))
-    axis = angle / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
-    quaternion = np.append(np.sin(0.5 * size) * axis, np.cos(0.5 * size))
-    turn: FloatArray = _validate.rotation_matrices(quaternion[None])[0]
-    return turn
+    return np.array([0.0, 0.0, np.sin(0.5 * angle), np.cos(0.5 * angle)])
 
 
 def _rotation_between(here: FloatArray, there: FloatArray) -> FloatArray:

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,16 +44,17 @@ from geomsrv.turning import TIME_TOLERANCE, approach, settled_at_start, velocity
 from geomsrv.world import ROUNDOFF, World
 
 __all__ = [
-    "CAPSULE_ROUNDING",
+    "SWITCHED_OFF",
     "Question",
+    "ask_followed",
     "climbed_contact_rows",
     "closing_speeds",
     "contact_rows",
-    "core_of_solids",
     "first_contact_row",
+    "followed_in_pairs",
     "followed_in_turning",
     "nearness",
-    "radii",
+    "slack_of",
 ]
 
 # The end of a capsule: the half length times a matrix entry good to 5 u, a sum; in three coordinates.
@@ -211,7 +211,7 @@ def _followed(world: World, pairs: IntArray, question: Question) -> BoolArray:
         return surfaces
     turns = world.turns[pairs].any(axis=1)
     stepwise = (turns & question.rotation) | (~turns & (_rolling(world, pairs) | surfaces))
-    followed: BoolArray = stepwise & _followed_in_pairs(world, pairs)
+    followed: BoolArray = stepwise & followed_in_pairs(world, pairs)
     return followed
 
 
@@ -230,7 +230,7 @@ def _held_meshes(
     return ContactRows.joined([now, ContactRows.silent(apart)]), missing
 
 
-def _followed_in_pairs(world: World, pairs: IntArray) -> BoolArray:
+def followed_in_pairs(world: World, pairs: IntArray) -> BoolArray:
     """(k,) bool: pairs that can be followed while they turn; two half spaces meet far away whatever they do."""
     unbounded = world.table.unbounded[world.shape[pairs]].all(axis=1)
     followed: BoolArray = followed_in_turning(world)[pairs].all(axis=1) & ~unbounded
@@ -297,7 +297,7 @@ def _approaches(
 ) -> tuple[ContactRows, Unsupported]:
     """When bodies come as near as the margin: a ball that large is added to one of them."""
     horizon = question.horizon
-    followed = _followed_in_pairs(world, pairs)
+    followed = followed_in_pairs(world, pairs)
     followed &= question.rotation | ~world.turns[pairs].any(axis=1)
     # Distances at rest need no looks, and the pair is near for as long as is asked.
     followed &= ~(_by_distance(world, pairs) & ~meshes(world, pairs) & at_rest(world, pairs, horizon))
@@ -352,32 +352,29 @@ def followed_in_turning(world: World) -> BoolArray:
 
 
 def _turning_contacts(world: World, pairs: IntArray, question: Question) -> ContactRows:
-    slack = _slack(world, pairs, question.margin)
-    status, lower, upper, normal, points = _ask(world, pairs, question, slack)
+    slack = slack_of(world, pairs, question.margin)
+    status, lower, upper, normal, points = ask_followed(world, pairs, question, slack)
     doubt = np.column_stack([world.uncertainty[pairs].sum(axis=1), world.velocity_uncertainty[pairs].sum(axis=1)])
     vague = np.flatnonzero(doubt.any(axis=1))
     time = lower.copy()
     if len(vague):
         slack[vague, 1:] += doubt[vague]
-        may, first, last, *_ = _ask(world, pairs[vague], replace(question, contact_set=False), slack[vague])
+        may, first, last, *_ = ask_followed(world, pairs[vague], replace(question, contact_set=False), slack[vague])
         never = status[vague] == ContactStatus.NEVER
         lower[vague] = np.where(never, first, np.fmin(first, lower[vague]))
         upper[vague] = np.where(may == ContactStatus.NEVER, np.nan, np.where(never, np.inf, last))
-    # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
-    radius = radii(world)[pairs]
-    uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
-    shift = 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
-    for k, along in zip(uneven.tolist(), shift, strict=True):
-        points[k] = None if points[k] is None else points[k] + along
     certain = (status != ContactStatus.TOUCHING) & (status < ContactStatus.UNSUPPORTED)
     rows = ContactRows(pairs, status, time, lower, upper, np.full(len(pairs), np.nan), normal, points, certain)
     return rows.take((status != ContactStatus.NEVER) | ~np.isnan(lower))
 
 
-def _ask(
+def ask_followed(
     world: World, pairs: IntArray, question: Question, slack: FloatArray
 ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, NDArray[np.object_]]:
-    """Status, lower, upper, normal and contact set, or None, from the engine."""
+    """Status, lower, upper, normal and contact set, or None, from the engine.
+
+    A contact set that is not wanted is one point.
+    """
     count = len(pairs)
     status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
     normal, sets = np.zeros((count, 3)), np.empty(count, dtype=object)
@@ -389,7 +386,7 @@ def _ask(
             status[part], lower[part], upper[part], normal[part], point = answer
             for k, at in zip(np.flatnonzero(part).tolist(), point, strict=True):
                 sets[k] = None if np.isnan(at[0]) else at[None]
-    radius = radii(world)
+    radius = _radii(world)
     planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
     motion = np.column_stack([world.twists, world.poses[:, :3]])
     motion[world.planar, 8] = 0.0
@@ -413,7 +410,16 @@ def _ask(
         # Cores of round bodies share no surface.
         sharp = ~radius[pairs[part]].any(axis=1)
         normal[part], points, offsets = settled_at_start((side_a, side_b), found, question.contact_set, sharp)
+        if not question.contact_set:
+            met = ~np.isnan(found[4][:, 0])
+            points, offsets = found[4][met], np.concatenate([[0], np.cumsum(met)])
         sets[part] = point_sets(points, offsets)
+    # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
+    radius = radius[pairs]
+    uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
+    shift = 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
+    for k, along in zip(uneven.tolist(), shift, strict=True):
+        sets[k] = None if sets[k] is None else sets[k] + along
     return status, lower, upper, normal, sets
 
 
@@ -445,31 +451,26 @@ def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatA
     return np.concatenate(items), np.cumsum([0, *map(len, items)], dtype=np.int64)
 
 
-def core_of_solids(world: World, rows: IntArray) -> tuple[Any, ...]:
-    """Vertices and offsets of hulls, and of the cores of spheres and capsules, in the fixed frame."""
-    return _side(world, rows, False, False)
-
-
 def _core_of(world: World, row: int) -> tuple[FloatArray | IntArray, ...]:
-    """The same for one solid."""
+    """One solid, as the engine reads it."""
     return _side(world, np.array([row]), False, bool(world.table.boxes[world.shape[row]]))
 
 
-def radii(world: World) -> FloatArray:
+def _radii(world: World) -> FloatArray:
     """(n,) rounding radius of spheres and capsules."""
     codes = [code for code, name in enumerate(_core.shape_kinds()) if name in ("sphere", "capsule")]
     radius: FloatArray = np.where(np.isin(world.kinds, codes), world.table.round[world.shape], 0.0)
     return radius
 
 
-def _slack(world: World, pairs: IntArray, nearness: float) -> FloatArray:
+def slack_of(world: World, pairs: IntArray, nearness: float) -> FloatArray:
     """(k, 3) margin, uncertainty, drift of the bodies as given."""
     names, params = _core.shape_kinds(), world.table.packed.params[world.shape]
     corners = np.where(world.kinds == names.index("convex"), params[:, 0], 0.0)  # rounded ones, of a frustum
     size = np.abs(world.poses[:, :3]).sum(axis=1) + world.table.reach[world.shape]
     ends = np.where(world.kinds == names.index("capsule"), CAPSULE_ROUNDING * size, 0.0)
     looked = _by_distance(world, pairs)  # at the bodies as they are, not at cores
-    margin = np.where(looked, 0.0, radii(world)[pairs].sum(axis=1)) + nearness
+    margin = np.where(looked, 0.0, _radii(world)[pairs].sum(axis=1)) + nearness
     off = np.where(np.isfinite(ends), corners + ends, 0.0)[pairs].sum(axis=1) + 2.0 * ROUNDOFF * margin
     off = np.where(looked, 2.0 * ROUNDOFF * nearness, off)
     return np.column_stack([margin, off, np.zeros(len(pairs))])

@@ -457,7 +457,8 @@ class Handlers:
                 raise GeometryError(f"ids[{same[0]}] is {request.id!r}, the body itself")
         else:
             rows = _others_of(world, row, flat)
-        answer = contacts_along(world, body, off, path, rows, request.tolerance or TIME_TOLERANCE)
+        rotation = self.engine.config.effects_rotation != OFF
+        answer = contacts_along(world, body, off, path, rows, request.tolerance or TIME_TOLERANCE, rotation)
         order: IntArray = np.arange(len(rows))
         if not request.ids:
             # What may meet is listed, too, and what is unsupported comes last.
