@@ -38,6 +38,9 @@ PLACE_ROUNDING = 64.0 * ROUNDOFF
 # Pieces are halved until they are this small a part of the time interval asked for; what cannot be told then never can.
 FINEST = 2.0**-3
 
+# Pieces that are halved for one obstacle: what hovers just above it as it spins up would take millions.
+MOST_HALVED = 4096
+
 
 class Piece(NamedTuple):
     """A stretch of constant twist."""
@@ -319,7 +322,8 @@ def first_contact_along(
     CollisionTimes
         Times are those of the motion.  ``time`` is ``time_lower``: free of contact before it, for the motion as its
         class describes it; contact is proven until ``time_upper``, which is inf where it is not.
-        At the start OVERLAPPING is proven; TOUCHING may be either.  ``cost.counts``: "pieces" looked at.
+        At the start OVERLAPPING is proven; TOUCHING may be either.  NOT_CONVERGED: ``time_lower`` is as far as the
+        work budget reached.  ``cost.counts``: "pieces" looked at.
 
     Raises
     ------
@@ -394,6 +398,7 @@ class Search:
         self.lower, self.upper = np.full(count, np.nan), np.full(count, np.nan)
         self.normal, self.point = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
         self.looked_at = 0
+        self._halved = np.zeros(count, np.int64)
 
     def look(self, rows: IntArray, piece: Piece, since: float, slack: FloatArray) -> Look:
         """What a piece that begins `since` seconds after the motion has with obstacles in some rows, in its own time.
@@ -421,11 +426,15 @@ class Search:
         if at_start:
             settled |= status == ContactStatus.OVERLAPPING
             settled &= (status != ContactStatus.TOUCHING) | fine
+        spent = ~free & ~settled & (self._halved[rows] == MOST_HALVED)
+        status[spent] = ContactStatus.NOT_CONVERGED
+        settled |= spent
         done, vague = rows[settled], rows[~free & ~settled]
         if len(done):
             self._settle(done, status[settled], lower[settled], upper[settled], proven[settled], at_start)
             self.normal[done], self.point[done] = normal[settled], point[settled]
         if len(vague):
+            self._halved[vague] += 1
             middle = start + 0.5 * (end - start)
             vague = self._follow(self._follow(vague, start, middle), middle, end)
         return np.sort(np.concatenate([rows[free], vague]))
