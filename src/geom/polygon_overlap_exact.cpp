@@ -45,6 +45,16 @@ GEOMSRV_WIDE_CLONES bool certain_sides(const PairedPolygon& p, const PairedPolyg
     return all(certain);
 }
 
+/// The greatest of each column.
+GEOMSRV_WIDE_CLONES void greatest_of_columns(const double* rows, std::size_t count, std::size_t stride,
+                                             double* to) {
+    for (std::size_t i = 0; i < stride; i += kLanes) {
+        Lanes most = -1.0;
+        for (std::size_t k = 0; k < count; ++k) most = greater(most, Lanes::load(rows + k * stride + i));
+        most.store(to + i);
+    }
+}
+
 }  // namespace
 
 /// On which side of every edge of the other polygon the vertices of a polygon are.
@@ -54,10 +64,9 @@ void ExactPolygonOverlap::find_sides(const PolygonPair& pair, int side) {
     Sides& sides = sides_[static_cast<std::size_t>(side)];
     sides.stride = (p.ring.size() + kLanes - 1) / kLanes * kLanes;
     sides.of.resize(sides.stride * q.edges);
-    if (certain_sides(p, q, pair.gap_error(), sides.stride, sides.of.data())) {
-        return;
-    }
-    for (std::size_t k = 0; k < q.edges; ++k) {
+    sides.furthest.resize(sides.stride);
+    const bool certain = certain_sides(p, q, pair.gap_error(), sides.stride, sides.of.data());
+    for (std::size_t k = 0; !certain && k < q.edges; ++k) {
         for (std::size_t i = 0; i < p.ring.size(); ++i) {
             double& sign = sides.of[k * sides.stride + i];
             if (sign == 0.0) {
@@ -65,6 +74,7 @@ void ExactPolygonOverlap::find_sides(const PolygonPair& pair, int side) {
             }
         }
     }
+    greatest_of_columns(sides.of.data(), q.edges, sides.stride, sides.furthest.data());
 }
 
 bool ExactPolygonOverlap::is_inside(const PolygonPair& pair, int side, std::size_t vertex) const {
@@ -73,10 +83,8 @@ bool ExactPolygonOverlap::is_inside(const PolygonPair& pair, int side, std::size
     if (q.edges == 0) {
         return same(v, q.ring[0]);
     }
-    for (std::size_t k = 0; k < q.edges; ++k) {
-        if (side_of(side, vertex, k) > 0) {
-            return false;
-        }
+    if (furthest(side, vertex) > 0) {
+        return false;
     }
     return q.edges > 2 || (sign_of_dot(q.ring[0], q.ring[1], q.ring[0], v) >= 0 &&
                            sign_of_dot(q.ring[1], q.ring[0], q.ring[1], v) >= 0);
@@ -95,7 +103,7 @@ void ExactPolygonOverlap::add_vertices(const PolygonPair& pair, int side) {
             continue;
         }
         Corner corner{v, side, i};
-        for (std::size_t k = 0; k < q.edges; ++k) {
+        for (std::size_t k = 0; k < q.edges && furthest(side, i) == 0; ++k) {
             // On the boundary of both, the one that turns further to the left is the boundary of the
             // intersection.
             const Vec2 end = q.ring[q.next(k)];

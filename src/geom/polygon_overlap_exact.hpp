@@ -34,7 +34,8 @@ private:
     };
 
     struct Sides {
-        std::vector<double> of;  ///< all vertices of a polygon, for each edge of the other
+        std::vector<double> of;        ///< all vertices of a polygon, for each edge of the other
+        std::vector<double> furthest;  ///< each vertex, of the edge that it is furthest beyond
         std::size_t stride = 0;
     };
 
@@ -43,6 +44,9 @@ private:
     [[nodiscard]] double side_of(int side, std::size_t vertex, std::size_t edge) const {
         return sides_[static_cast<std::size_t>(side)]
             .of[edge * sides_[static_cast<std::size_t>(side)].stride + vertex];
+    }
+    [[nodiscard]] double furthest(int side, std::size_t vertex) const {
+        return sides_[static_cast<std::size_t>(side)].furthest[vertex];
     }
     [[nodiscard]] bool is_inside(const PolygonPair& pair, int side, std::size_t vertex) const;
     void add_vertices(const PolygonPair& pair, int side);
