@@ -44,6 +44,7 @@ GEOMSRV_INLINE std::array<L, 3> local_rows(const CullPlanes<L>& planes, const do
         FourRows<3> found(p);
         for (int k = 0; k < 3; ++k) found.at[k] = found.at[k] - shift[k];
         if (planes.scaled) {
+            stay_a_branch();
             for (Lanes& x : found.at) x = x * planes.unit.first * planes.unit.second;
         }
         return found;

@@ -133,6 +133,11 @@ using LaneMask = Lanes::Mask;
 /// As wide, of single precision.
 using FloatLanes = LanesOf<float, 8>;
 
+/// To be called in a branch of a loop that computes with lanes if one condition holds for all of them.  Where
+/// there is AVX-512, GCC 12 may compute such a branch under a mask and take the condition itself for it; as 1
+/// it has one bit, so all lanes but the first are left out.  It leaves loops with assembler statements alone.
+GEOMSRV_INLINE void stay_a_branch() { asm(""); }
+
 /// condition ? a : b, for a number and lane by lane.
 template <class Real>
 GEOMSRV_INLINE Real select(bool condition, Real a, Real b) {
