@@ -529,6 +529,36 @@ def test_solids_that_turn_and_are_uncertain():
     assert 1.4 < turned.time_lower[0] < np.pi / 2
 
 
+@pytest.mark.parametrize(("spin", "radius", "share"), [(0.05, 0.05, 0.55), (1.0, 0.01, 0.85)])
+def test_intervals_of_uncertain_boxes_that_turn_hold_and_mostly_end(spin, radius, share):
+    """All placements within the uncertainty meet in the interval, and most hits have an end of it."""
+    rng = np.random.default_rng(11)
+    objects, tried = [], 0
+    for k in range(120):
+        twist = np.concatenate([rng.normal(size=3), spin * rng.normal(size=3)])
+        objects.append((f"o{k:03}", gs.Box(rng.uniform(0.1, 0.5, 3)), random_pose(rng, 6.0), twist))
+    may = scene_of([gs.SceneObject(*o, uncertainty=radius) for o in objects]).first_contacts(5.0)
+    rows = rows_of(may)
+    ahead = np.isin(may.status, (ContactStatus.WILL_TOUCH, ContactStatus.GRAZING))
+    hits, finite = int(ahead.sum()), int((ahead & np.isfinite(may.time_upper)).sum())
+    assert hits > 25 and finite >= share * hits, (hits, finite)
+    for _ in range(8):
+        shifted = []
+        for name, box, pose, twist in objects:
+            push = rng.normal(size=3)
+            push *= radius / np.linalg.norm(push)
+            shifted.append(gs.SceneObject(name, box, pose + [*push, 0, 0, 0, 0], twist))
+        moved = scene_of(shifted).first_contacts(5.0)
+        there = rows_of(moved)
+        for pair, k in there.items():
+            row = rows[pair]
+            assert may.time_lower[row] <= moved.time_upper[k] and moved.time_lower[k] <= may.time_upper[row], pair
+            tried += may.time_upper[row] < INF
+        for pair, row in rows.items():
+            assert pair in there or may.time_upper[row] == INF, pair
+    assert tried > 100
+
+
 def test_turning_objects_as_the_queries_see_them():
     """The scene adds placing and choosing, no geometry: all pairs of boxes and hulls that fly about."""
     rng = np.random.default_rng(17)

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import field_cases, reproducer
+from numpy.typing import NDArray
 from oracle import polygon
 from oracle.turning import Turning, apart_until, meet_at
+from scipy.spatial.transform import Rotation
 
 import geomsrv as gs
 from geomsrv import _core
@@ -555,9 +557,12 @@ def test_batches(rng: np.random.Generator) -> None:
 
 
 def with_slack(pair: Pair, slack: tuple[float, float, float], t_max: float) -> tuple[int, float, float]:
-    """Status, lower and upper of a pair in space; slack is margin, uncertainty, drift."""
+    """Status, lower and upper of a pair; slack is margin, uncertainty, drift."""
     sides = [(b.vertices, b.offsets) for b in (bodies(pair["a"]), bodies(pair["b"]))]
-    motions = [np.concatenate([pair[f"v{x}"], pair[f"w{x}"], pair[f"c{x}"]])[None] for x in "ab"]
+    d = np.shape(pair["a"])[1]
+    motions = np.zeros((2, 1, 9))
+    for motion, x in zip(motions, "ab", strict=True):
+        motion[0, :d], motion[0, 5 if d == 2 else slice(3, 6)], motion[0, 6 : 6 + d] = (pair[k + x] for k in "vwc")
     status, lower, upper, *_ = _core.first_contact_turning(*sides, *motions, t_max, 1e-6, np.array([slack]))
     return int(status[0]), float(lower[0]), float(upper[0])
 
@@ -603,6 +608,86 @@ def test_bodies_within_their_uncertainty(rng: np.random.Generator) -> None:
             else:
                 assert lower == 0.0, text
     assert outcomes[gs.NEVER] >= 5 and outcomes[ContactStatus.GRAZING] >= 5 and inside >= 50, (outcomes, inside)
+
+
+LATE = 0.1  #: of the time in which contact is uncertain
+
+
+@pytest.mark.parametrize("spin", [0.0, 1e-3])
+@pytest.mark.parametrize("off", [1e-4, 0.05, 0.4])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contact_of_faces_that_meet_squarely_is_proven_once_they_are_deep_enough(
+    dimension: int, off: float, spin: float
+) -> None:
+    """A cube of 1 m, 1 m before a wall that is 1 m thick: between (1 - off) / 2 and (1 + off) / 2 seconds at 2 m/s."""
+    cube = np.array(SQUARE) if dimension == 2 else np.array([(*p, z) for p in SQUARE for z in (-0.5, 0.5)])
+    wall = cube * [1.0, 6.0, 6.0][:dimension] + [2.0, 0.0, 0.0][:dimension]
+    zero, push = np.zeros(dimension), np.array([2.0, 0.0, 0.0][:dimension])
+    turn: Any = spin if dimension == 2 else np.array([0.0, 0.0, spin])
+    pair = {"a": cube, "va": push, "wa": turn, "ca": zero, "b": wall, "vb": zero, "wb": 0.0 * turn, "cb": zero}
+    status, lower, upper = with_slack(pair, (0.0, off, 0.0), 9.0)
+    corner = 0.5 * spin  # a face that has turned leans by so much where it meets the wall
+    assert status == ContactStatus.GRAZING
+    assert 0.5 * (1.0 - off - corner) - 1e-6 <= lower <= 0.5 * (1.0 - off) + 1e-12
+    assert 0.5 * (1.0 + off - corner) <= upper <= 0.5 * (1.0 + off + corner) + LATE * off
+    # The longer way round: the cube is a whole metre inside at most.
+    assert with_slack(pair, (0.0, 1.1, 0.0), 9.0)[2] == np.inf
+    # It is over before it can be proven, or just not.
+    assert not with_slack(pair, (0.0, off, 0.0), 0.5 * (1.0 + off - 2.0 * corner) - 1e-9)[2] < np.inf
+    assert with_slack(pair, (0.0, off, 0.0), 0.5 * (1.0 + off + 2.0 * corner) + 1e-9)[2] < np.inf
+
+
+def test_contact_of_balls_is_proven_once_they_are_deep_enough() -> None:
+    """1/4 and 1/2 in radius, 4 apart, at 0.5 m/s; the drift of 0.05 m/s counts from the start."""
+    zero = np.zeros(3)
+    pair = {"a": [(0, 0, 0)], "va": np.array([0.5, 0, 0]), "wa": np.array([0, 0, 0.1]), "ca": zero}
+    pair |= {"b": [(4, 0, 0)], "vb": zero, "wb": zero, "cb": zero}
+    for off, drift in ((0.1, 0.0), (0.1, 0.05), (0.7, 0.0)):
+        status, lower, upper = with_slack(pair, (0.75, off, drift), 20.0)
+        first, last = (3.25 - off) / (0.5 + drift), (3.25 + off) / (0.5 - drift)
+        assert status == ContactStatus.GRAZING and first - 1e-6 <= lower <= first
+        assert last - 1e-12 <= upper <= last + LATE * (last - first)
+    assert with_slack(pair, (0.75, 0.8, 0.0), 20.0)[2] == np.inf
+    # Deeper than that at the start, or not; at no speed, too.
+    near = pair | {"b": [(0.6, 0, 0)]}
+    for moving in (near, near | {"va": zero}):
+        assert with_slack(moving, (0.75, 0.14, 0.0), 20.0) == (gs.OVERLAPPING, 0.0, 0.0)
+    status, lower, upper = with_slack(near, (0.75, 0.16, 0.0), 20.0)
+    assert status == gs.TOUCHING and lower == 0.0 and 0.02 - 1e-12 <= upper <= 0.02 * (1.0 + LATE)
+    assert with_slack(near | {"va": zero}, (0.75, 0.16, 0.0), 20.0) == (gs.TOUCHING, 0.0, np.inf)
+
+
+def depth_at(pair: Pair, when: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How deep the bodies overlap at some times, in the kernel for bodies at rest."""
+    placed = []
+    for x in "ab":
+        arms, turn = pair[x] - pair[f"c{x}"], Rotation.from_rotvec(np.outer(when, pair[f"w{x}"]))
+        middle = pair[f"c{x}"] + np.outer(when, pair[f"v{x}"])
+        rows = middle[:, None] + np.einsum("tij,kj->tki", turn.as_matrix(), arms)
+        placed.append(gs.Polytopes.from_list(list(rows)))
+    return -gs.distance(*placed, want=("penetration",)).distance
+
+
+def test_contact_is_proven_wherever_bodies_overlap_by_more_than_their_uncertainty(rng: np.random.Generator) -> None:
+    """Overlapping so deep then, soon after they do for the first time."""
+    outcomes: Counter[str] = Counter()
+    for _ in range(120):
+        pair = random_pair(rng, 3, size=1.0, rate=2.0, thinness=1.0)
+        off = 10.0 ** rng.uniform(-3, 1)
+        status, lower, upper = with_slack(pair, (0.0, off, 0.0), 3.0)
+        if status not in (ContactStatus.GRAZING, gs.TOUCHING):
+            continue
+        when = np.linspace(lower, 3.0, 2001)
+        depth = depth_at(pair, when)
+        text = reproducer(**pair, off=off) + f"{status} {lower} {upper} {depth.max()}"
+        deep = when[depth > off + 1e-9]
+        outcomes["deep" if len(deep) else "never deep"] += 1
+        if upper < np.inf:
+            assert depth_at(pair, np.array([upper]))[0] > off - 1e-9, text
+        outcomes["late"] += int(len(deep) > 0 and upper > deep[0] + LATE * (deep[0] - lower))
+    assert min(outcomes["deep"], outcomes["never deep"]) >= 10, outcomes
+    # Bodies may be deep enough just for a moment between two looks.
+    assert 10 * outcomes["late"] <= outcomes["deep"], outcomes
 
 
 @pytest.mark.parametrize(

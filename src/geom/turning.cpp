@@ -27,6 +27,7 @@
 #include <limits>
 #include <span>
 
+#include "geom/growing_hull.hpp"
 #include "geom/rounding.hpp"
 
 namespace geomsrv {
@@ -73,6 +74,12 @@ constexpr double kFurtherAhead = 8.0;
 constexpr int kTries = 12;      // before the last one, at the tolerance
 constexpr int kLateTries = 40;  // beyond the tolerance, each twice as far, if there is no step at all
 constexpr int kCrossings = 3;   // tries at proving contact by the intermediate value theorem
+
+// Where the bodies may be off by more than they come in a tolerance, contact is proven later: to this share
+// of the time since it became possible, which doubles after so many looks, and with so many in all.
+constexpr double kLateShare = 0x1p-5;
+constexpr int kLooksAtShare = 16;
+constexpr int kLateLooks = 128;
 
 // 2 pi, rounded up; a period takes four more roundings.
 constexpr double kTwoPi = 0x1.921fb54442d19p+2;
@@ -601,6 +608,81 @@ double TurningSolver::proven_contact(const Look& at, const Witness& feature, dou
     }
 }
 
+/// Whether the bodies may be off by more than they come in a tolerance.  What is apart by that much at first
+/// and overlaps by it at last has come twice as far, so no contact is proven within the tolerance.
+bool TurningSolver::unsure(double t, double tolerance) const { return 2.0 * vague(t) > tolerance * way(1.0); }
+
+/// By how much all bodies that the slack allows certainly overlap, > 0; otherwise, negated, what is missing.
+/// The difference b - a holds a ball about the origin as large as the depth, and so does every other one less
+/// what its supports may be off by.
+double TurningSolver::certain_depth(const Look& at) {
+    const double rounding = kMemberError * at.size;
+    double depth = -(at.found.length + rounding);
+    // Across their plane, planar bodies are never further apart than that.
+    if (at.found.state != GjkState::apart || at.found.length <= rounding) {
+        Core a = at.a;
+        if (planar_) {
+            // With upright walls; those of the difference are as deep as its edges, its ends by the size.
+            prism_.clear();
+            for (const int row : {0, 0, 1, 1}) {
+                const double* from = a.points + static_cast<std::ptrdiff_t>(row) * a.count;
+                prism_.insert(prism_.end(), from, from + a.count);
+            }
+            for (const double height : {-at.size, at.size}) {
+                prism_.insert(prism_.end(), static_cast<std::size_t>(a.count), height);
+            }
+            a.points = prism_.data();
+            a.count *= 2;
+            a.reach += at.size;
+        }
+        const bool seeded = !planar_ && at.found.state == GjkState::enclosed;
+        const NearestFacet facet = nearest_facet(a, at.b, seeded ? at.found.witness : Witness{});
+        if (!facet.flat && facet.upper < 0.0) {
+            depth = std::max(depth, -facet.upper);
+        }
+    }
+    return depth + slack_.margin - (at.error + kHeightError * at.size);
+}
+
+/// The first time from `lower` on at or before which contact is proven of all bodies that the slack allows,
+/// to kLateShare of the time since; infinity if none is found until `end`.
+double TurningSolver::certain_contact(const Look& at, const Witness& feature, double lower, double end,
+                                      double tolerance) {
+    // Signed distances change no faster than this: what is missing takes its time.
+    const double speed = way(1.0);
+    double t = lower;
+    double before = lower;  // no proof is expected sooner
+    double share = kLateShare;
+    int tries = 0;
+    const auto proven = [&](double when) {
+        const double depth = certain_depth(look(when, at.found.normal));
+        before = depth > 0.0 ? before : later(when, -depth / speed);
+        return depth > 0.0 || (++tries <= kCrossings && crossing(at, feature, when));
+    };
+    for (int i = 1; !proven(t); ++i) {
+        share = i % kLooksAtShare == 0 ? 2.0 * share : share;
+        const double least = std::max(t + std::max(share * (t - lower), kLateShare * tolerance), next_up(t));
+        const double next = std::min(std::max(before, least), end);
+        if (i == kLateLooks || !(next > t) || !(next < kInfinity) || !a_.body.placeable(next) ||
+            !b_.body.placeable(next) || !(norm(narrow(between_)) + way(next) < kLargestReach)) {
+            return kInfinity;
+        }
+        t = next;
+    }
+    while (t - before > kLateShare * std::max(t - lower, tolerance)) {
+        const double middle = before + 0.5 * (t - before);
+        if (!(middle > before) || !(middle < t)) {
+            break;
+        }
+        if (proven(middle)) {
+            t = middle;
+        } else {
+            before = std::max(before, middle);
+        }
+    }
+    return t;
+}
+
 Vec3 TurningSolver::in_world(Vec3 point, double t) const {
     const PowerOfTwo down(-exponent_);
     return center_a_ + (t * velocity_a_ + down * point);
@@ -706,7 +788,7 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
 
         if (t > 0.0) {
             at = look(t, start);
-        } else if (overlap_at(t, start, at)) {
+        } else if (overlap_at(t, start, at) || (unsure(t, tolerance) && certain_depth(at) > 0.0)) {
             out.status = TurningStatus::overlapping;
             out.lower = out.upper = 0.0;
             out.point = in_world(0.5 * (at.found.point_a + at.found.point_b), 0.0);
@@ -747,7 +829,12 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
         const double expected = step * shrinking * shrinking;
         last_step = step;
         if (kStepsAhead * expected <= tolerance || !(next > t)) {
-            const double upper = proven_contact(at, feature, step, expected, t_max, tolerance);
+            double upper = kInfinity;
+            if (!unsure(next, tolerance)) {
+                upper = proven_contact(at, feature, step, expected, t_max, tolerance);
+            } else if (!(next > t)) {
+                upper = certain_contact(at, feature, next, end, tolerance);
+            }
             if (upper < kInfinity || !(next > t)) {
                 const bool in_time = upper - next <= tolerance || upper == next_up(next);
                 out.status = t == 0.0 && step == 0.0 ? TurningStatus::touching

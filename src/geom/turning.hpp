@@ -79,6 +79,10 @@ private:
     bool crossing(const Look& at, const Witness& feature, double t);
     double proven_contact(const Look& at, const Witness& feature, double step, double expected, double t_max,
                           double tolerance);
+    bool unsure(double t, double tolerance) const;
+    double certain_depth(const Look& at);
+    double certain_contact(const Look& at, const Witness& feature, double lower, double end,
+                           double tolerance);
     void find_points(const Look& at, const Witness& feature, Vec3 middle, double near, double span,
                      TurningContact& out);
     Vec3 normal_of(const Look& at, const Witness& feature, Vec3 normal) const;
@@ -97,6 +101,7 @@ private:
     Vec3 center_a_, velocity_a_;
     PlacedContactPoints contact_;
     std::vector<Vec3> points_;
+    std::vector<double> prism_;  // on a planar body, with corners above and below it
 };
 
 }  // namespace geomsrv
