@@ -38,6 +38,10 @@ PLACE_ROUNDING = 64.0 * ROUNDOFF
 # Pieces are halved until they are this small a part of the time interval asked for; what cannot be told then never can.
 FINEST = 2.0**-3
 
+# What may be met, for all that the bodies may be off by, is followed on until it surely is, on pieces that stray by no
+# more than this part of that.
+SHARE_OF_DOUBT = 2.0**-3
+
 # Pieces that are halved for one obstacle: what hovers just above it as it spins up would take millions.
 MOST_HALVED = 4096
 
@@ -416,28 +420,32 @@ class Search:
             open_rows = self._follow(open_rows, start, end)
 
     def _follow(self, rows: IntArray, start: float, end: float) -> IntArray:
-        """Settle what has a contact between two times; returns the rows that have none."""
+        """Settle what has a contact between two times; returns the rows that have none, or that may have none."""
         piece = self._motion.piece(start, end)
-        status, lower, upper, normal, point, fine = self._ask(rows, piece)
+        begun = np.isfinite(self.lower[rows])
+        status, lower, upper, normal, point, fine = self._ask(rows, piece, begun)
         free = status == ContactStatus.NEVER
         at_start = start == self._motion.start
         proven = np.isfinite(upper) & (upper - lower <= self._step)
-        settled = ~free & (proven | fine)
+        settled = ~free & (fine | (proven & ~begun))
         if at_start:
             settled |= status == ContactStatus.OVERLAPPING
             settled &= (status != ContactStatus.TOUCHING) | fine
         spent = ~free & ~settled & (self._halved[rows] == MOST_HALVED)
         status[spent] = ContactStatus.NOT_CONVERGED
         settled |= spent
-        done, vague = rows[settled], rows[~free & ~settled]
-        if len(done):
-            self._settle(done, status[settled], lower[settled], upper[settled], proven[settled], at_start)
-            self.normal[done], self.point[done] = normal[settled], point[settled]
+        vague = rows[~free & ~settled]
+        if (new := settled & ~begun).any():
+            done = rows[new]
+            self._settle(done, status[new], lower[new], upper[new], proven[new], at_start)
+            self.normal[done], self.point[done] = normal[new], point[new]
+        self.upper[rows[settled & begun]] = upper[settled & begun]
+        unsure = settled & ~spent & np.isinf(upper) & self._doubt[rows].any(axis=1)
         if len(vague):
             self._halved[vague] += 1
             middle = start + 0.5 * (end - start)
             vague = self._follow(self._follow(vague, start, middle), middle, end)
-        return np.sort(np.concatenate([rows[free], vague]))
+        return np.sort(np.concatenate([rows[free | unsure], vague]))
 
     def _settle(
         self,
@@ -456,9 +464,12 @@ class Search:
         self.lower[rows], self.upper[rows] = lower, upper
 
     def _ask(
-        self, rows: IntArray, piece: Piece
+        self, rows: IntArray, piece: Piece, begun: BoolArray
     ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
-        """The engine's answer on a piece, in times of the motion, and whether it is as fine as it can be."""
+        """The engine's answer on a piece, in times of the motion, and whether it is as fine as it need be.
+
+        Of rows that have `begun` to be in doubt, and are followed until they surely meet, that need not be much.
+        """
         length, since = piece.end - piece.start, piece.start - self._motion.start
         rounding = PLACE_ROUNDING * (
             self._reach * (1.0 + piece.angles) + piece.sizes + self._far[rows] + self._speed[rows] * (since + length)
@@ -473,7 +484,7 @@ class Search:
         lower = np.maximum(np.nextafter(found[1] + shift, -np.inf), piece.start)
         upper = np.nextafter(found[2] + shift, np.inf)
         upper = np.where(found[2] == 0.0, piece.start, upper)
-        fine = (stray <= rounding) | (length <= FINEST * self._step)
+        fine = (stray <= rounding) | (length <= FINEST * self._step) | (begun & (stray <= SHARE_OF_DOUBT * off))
         return found[0], lower, upper, found[3], found[4], fine
 
 
