@@ -59,6 +59,16 @@ def first_contact_turning(
     slack: _F,
     contact_set: bool = False,
 ) -> tuple[_U, _F, _F, _F, _F, _B, _I, _F, _I]: ...
+def shared_turning(
+    a: tuple[_F | _I, ...],
+    b: tuple[_F | _I, ...],
+    motion_a: _F,
+    motion_b: _F,
+    time: float,
+    span: float,
+    normal: _F,
+    slack: _F,
+) -> tuple[_F, _I]: ...
 def points_on_twist(
     ring: _F, twist: _F, points: _F, velocities: _F, t_max: float, tolerance: float
 ) -> tuple[_U, _F, _F, int]: ...

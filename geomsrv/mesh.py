@@ -18,9 +18,10 @@ from geomsrv import _validate
 from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray, IntArray, sets_end_to_end
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.mesh_contact import common_plane, united_in_space
+from geomsrv.mesh_shared import Moving, shared_parts
 from geomsrv.mesh_tree import Sweep, Tree, in_order
 from geomsrv.shapes import Boxes, Convex, Mesh, Polytopes
-from geomsrv.turning import approach, middles, turns
+from geomsrv.turning import approach, middles, packed, turns
 from geomsrv.verify import Pair, clip_of, relative_velocity, way_of
 
 __all__ = ["first_contact_meshes"]
@@ -204,6 +205,18 @@ class _Question(NamedTuple):
         a, b = (body.tree(self.item) for body in self.bodies)
         return a, b
 
+    def moving(self, side: int) -> Moving:
+        """One of them, as it turns."""
+        body, name = self.bodies[side], "ab"[side]
+        tree = body.tree(self.item)
+        about = (self.options[f"{what}_{name}"] for what in ("angular_velocity", "center"))
+        return Moving(
+            tree,
+            lambda rows: packed(body.nodes(self.item, tree, rows)),
+            lambda rows: packed(body.batch(self.item, rows)),
+            np.concatenate([self.ways[side], *about])[None],
+        )
+
 
 def _first(q: _Question) -> _Row:
     found, row = _Found(), _Row()
@@ -291,7 +304,7 @@ def _first_turning(q: _Question) -> _Row:
 
     def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
         nonlocal bound
-        answer = followed(q.batches((pieces_a, pieces_b)), True)
+        answer = followed(q.batches((pieces_a, pieces_b)), q.wanted)
         q.counts["pairs of pieces"] += len(pieces_a)
         found.answers.append(answer)
         bound = float(np.fmin.reduce(answer.time_upper, initial=bound))
@@ -315,7 +328,10 @@ def _first_turning(q: _Question) -> _Row:
     if row.status != ContactStatus.OVERLAPPING:
         row.normal = found.column("normal")[first]
         row.closing_speed = float(found.column("closing_speed")[first])
-    row.parts = [part for part in [found.set_of(first)] if len(part)]
+    if q.wanted and len(found.set_of(first)):
+        exactly = np.zeros((1, 3))  # no margin, nothing in doubt
+        parts = shared_parts(q.moving(0), q.moving(1), row.status, low, high, row.normal, exactly)
+        row.parts = parts or [found.set_of(first)]
     return row
 
 

@@ -16,11 +16,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geomsrv import _core
 from geomsrv.advancement import advance
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
 from geomsrv.mesh import NODE_ROUNDING, SMALLEST, TURNING_BATCH
+from geomsrv.mesh_shared import Bodies, Moving, shared_parts
 from geomsrv.mesh_tree import Tree, in_order
 from geomsrv.narrow_phase import RELATIVE_POSE_ROUNDING, placed
 from geomsrv.shapes import Mesh, PackedShapes
@@ -39,7 +41,6 @@ __all__ = ["Answer", "follow_meshes", "meshes"]
 
 Answer = tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]  #: status, lower, upper, normal, point
 _Row = tuple[int, float, float, FloatArray, FloatArray]  #: that of one pair
-_Bodies = tuple[FloatArray | IntArray, ...]
 
 SPHERE, CAPSULE, BOX, CONVEX, HALF_SPACE, *_ = range(len(_core.shape_kinds()))
 
@@ -58,9 +59,12 @@ def follow_meshes(
     horizon: float,
     tolerance: float,
     slack: FloatArray,
-    core: Callable[[int], _Bodies],
-) -> Answer:
-    """Status, lower, upper, normal and point of pairs, as of the engine's kernel for bodies that turn.
+    core: Callable[[int], Bodies],
+    contact_set: bool,
+) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, NDArray[np.object_]]:
+    """Status, lower, upper and normal of pairs, as of the engine's kernel for bodies that turn, and contact sets.
+
+    These are lists of parts, or None; such as are not wanted are one point.
 
     Parameters
     ----------
@@ -69,24 +73,31 @@ def follow_meshes(
         within.
     core : callable
         The box, hull, or core of a round body in a row of the world, as the engine reads it.
+    contact_set : bool
+        Whether contact sets are wanted.
     """
     rows = []
+    sets = np.empty(len(pairs), dtype=object)
     sides: dict[int, _Side] = {}
-    for pair, room in zip(pairs.tolist(), slack, strict=True):
+    for k, (pair, room) in enumerate(zip(pairs.tolist(), slack, strict=True)):
         for row in pair:
             if row not in sides:
                 sides[row] = _Side(world, row, core)
         a, b = (sides[row] for row in pair)
-        rows.append(_first(_Question(world, a, b, horizon, tolerance, room[None])))
+        question = _Question(world, a, b, horizon, tolerance, room[None])
+        rows.append(_first(question))
+        point = rows[-1][4]
+        if not np.isnan(point[0]):
+            sets[k] = (contact_set and question.shared(*rows[-1][:4])) or [point[None]]
     status, lower, upper = (np.array([row[k] for row in rows]) for k in range(3))
-    normal, point = (np.array([row[k] for row in rows]).reshape(-1, 3) for k in (3, 4))
-    return status.astype(np.uint8), lower, upper, normal, point
+    normal = np.array([row[3] for row in rows]).reshape(-1, 3)
+    return status.astype(np.uint8), lower, upper, normal, sets
 
 
 class _Side:
     """An object: its boxes and its pieces, as the engine reads them, one for all where it is no mesh."""
 
-    def __init__(self, world: World, row: int, core: Callable[[int], _Bodies]) -> None:
+    def __init__(self, world: World, row: int, core: Callable[[int], Bodies]) -> None:
         table, shape = world.table, int(world.shape[row])
         self.row, self.kind = row, int(world.kinds[row])
         self.motion = np.concatenate([world.twists[row], world.poses[row, :3]])[None]
@@ -104,11 +115,11 @@ class _Side:
         self.curved = self.kind > HALF_SPACE
         if self.curved or self.kind == HALF_SPACE:
             half = table.half[shape][None] * (1.0 + NODE_ROUNDING) + self._grown
-            self._body: _Bodies = (world.poses[row, :3][None].copy(), self.axes, half)
+            self._body: Bodies = (world.poses[row, :3][None].copy(), self.axes, half)
         else:
             self._body = core(row)
 
-    def nodes(self, rows: IntArray) -> _Bodies:
+    def nodes(self, rows: IntArray) -> Bodies:
         """Boxes that hold what is in nodes of the tree; they turn with it."""
         if self.mesh is None:
             return self._body
@@ -118,7 +129,7 @@ class _Side:
         axes = np.ascontiguousarray(np.broadcast_to(self.axes, (len(rows), 3, 3)))
         return self._placed(center), axes, half
 
-    def pieces(self, rows: IntArray) -> _Bodies:
+    def pieces(self, rows: IntArray) -> Bodies:
         """Triangles, in the fixed frame."""
         if self.mesh is None:
             return self._body
@@ -145,7 +156,7 @@ class _Question(NamedTuple):
     tolerance: float
     slack: FloatArray  #: (1, 3)
 
-    def engine(self, body_a: _Bodies, body_b: _Bodies, end: float) -> Answer:
+    def engine(self, body_a: Bodies, body_b: Bodies, end: float) -> Answer:
         """Boxes, or hulls, against such."""
         return self._asked(body_a, body_b, end, self.slack)
 
@@ -157,11 +168,18 @@ class _Question(NamedTuple):
         status, lower, *_ = self._asked(self.a.nodes(nodes_a), self.b.nodes(nodes_b), end, near)
         return np.where(status == ContactStatus.NEVER, np.inf, np.fmax(lower, 0.0))
 
-    def _asked(self, body_a: _Bodies, body_b: _Bodies, end: float, slack: FloatArray) -> Answer:
+    def _asked(self, body_a: Bodies, body_b: Bodies, end: float, slack: FloatArray) -> Answer:
         found: Any = _core.first_contact_turning(
             body_a, body_b, self.a.motion, self.b.motion, end, self.tolerance, slack
         )
         return found[:5]  # type: ignore[no-any-return]
+
+    def shared(self, status: int, lower: float, upper: float, normal: FloatArray) -> list[FloatArray]:
+        """Contact set, part by part; empty where a point must do."""
+        if any(body.mesh is None and (body.curved or body.kind == HALF_SPACE) for body in (self.a, self.b)):
+            return []
+        a, b = (Moving(body.tree, body.nodes, body.pieces, body.motion) for body in (self.a, self.b))
+        return shared_parts(a, b, status, lower, upper, normal, self.slack)
 
     def by_distance(self, hulls: FloatArray, end: float) -> Answer:
         """Hulls (k, m, 3) of points of the mesh, in its own frame, against the curved body or half space."""

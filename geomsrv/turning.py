@@ -20,6 +20,7 @@ __all__ = [
     "approach",
     "first_contact_turning",
     "middles",
+    "packed",
     "settled_at_start",
     "turns",
     "velocity_at",
@@ -80,7 +81,7 @@ def first_contact_turning(
         motion = np.zeros((max(len(part) for part in parts), 9))
         for k, part in enumerate(parts):
             motion[:, 3 * k : 3 * k + part.shape[1]] = part
-        sides.append((_packed(body), motion))
+        sides.append((packed(body), motion))
     (body_a, motion_a), (body_b, motion_b) = sides
     found = _core.first_contact_turning(
         body_a, body_b, motion_a, motion_b, end, step, np.zeros((1, 3)), bool(contact_set)
@@ -187,7 +188,7 @@ def approach(velocity_a: FloatArray, velocity_b: FloatArray, normal: FloatArray)
     return speed
 
 
-def _packed(body: Bodies) -> tuple[Any, ...]:
+def packed(body: Bodies) -> tuple[Any, ...]:
     """As the engine reads it."""
     return (body.center, body.axes, body.half_extents) if isinstance(body, Boxes) else (body.vertices, body.offsets)
 

@@ -380,12 +380,17 @@ def ask_followed(
     normal, sets = np.zeros((count, 3)), np.empty(count, dtype=object)
     surfaces = meshes(world, pairs)
     looked = _by_distance(world, pairs) & ~surfaces
-    for part, follow in ((surfaces, _follow_meshes), (looked, advance)):
-        if part.any():
-            answer = follow(world, pairs[part], question.horizon, question.tolerance, slack[part])
-            status[part], lower[part], upper[part], normal[part], point = answer
-            for k, at in zip(np.flatnonzero(part).tolist(), point, strict=True):
-                sets[k] = None if np.isnan(at[0]) else at[None]
+    asked = question.horizon, question.tolerance
+    if surfaces.any():
+        core = partial(_core_of, world)
+        answer = follow_meshes(world, pairs[surfaces], *asked, slack[surfaces], core, question.contact_set)
+        status[surfaces], lower[surfaces], upper[surfaces], normal[surfaces], sets[surfaces] = answer
+    if looked.any():
+        status[looked], lower[looked], upper[looked], normal[looked], point = advance(
+            world, pairs[looked], *asked, slack[looked]
+        )
+        for k, at in zip(np.flatnonzero(looked).tolist(), point, strict=True):
+            sets[k] = None if np.isnan(at[0]) else at[None]
     radius = _radii(world)
     planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
     motion = np.column_stack([world.twists, world.poses[:, :3]])
@@ -419,15 +424,11 @@ def ask_followed(
     uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
     shift = 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
     for k, along in zip(uneven.tolist(), shift, strict=True):
-        sets[k] = None if sets[k] is None else sets[k] + along
+        parts = sets[k]
+        sets[k] = (
+            [part + along for part in parts] if isinstance(parts, list) else None if parts is None else parts + along
+        )
     return status, lower, upper, normal, sets
-
-
-def _follow_meshes(
-    world: World, pairs: IntArray, horizon: float, tolerance: float, slack: FloatArray
-) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The same of meshes, with one point each."""
-    return follow_meshes(world, pairs, horizon, tolerance, slack, partial(_core_of, world))
 
 
 def _side(world: World, rows: IntArray, flat: bool, boxes: bool) -> tuple[FloatArray | IntArray, ...]:

@@ -38,7 +38,7 @@ PYTHON_LAYERS = {
     "query": (
         "geomsrv/queries.py geomsrv/ladder.py geomsrv/turning.py geomsrv/footprint.py "
         "geomsrv/region.py geomsrv/region_contact.py geomsrv/mesh.py geomsrv/mesh_contact.py geomsrv/mesh_tree.py "
-        "geomsrv/shapes.py "
+        "geomsrv/mesh_shared.py geomsrv/shapes.py "
         "geomsrv/answers.py geomsrv/_validate.py geomsrv/errors.py "
         "geomsrv/certificates.py geomsrv/evidence.py geomsrv/verify.py geomsrv/_version.py",
         ("numpy",),

@@ -84,6 +84,14 @@ private:
     int dimension_ = 3;
 };
 
+auto points_of(const std::vector<Vec3>& rows) {
+    const auto points = empty<double>({rows.size(), 3});
+    if (!rows.empty()) {
+        std::memcpy(points.data, rows.data(), rows.size() * sizeof(Vec3));
+    }
+    return points;
+}
+
 nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
                                 const Motions& motion_b, double t_max, double tolerance, const Rows3& slack,
                                 bool contact_set) {
@@ -121,12 +129,32 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
             offsets.data[i + 1] = static_cast<std::int64_t>(shared.size());
         }
     }
-    const auto points = empty<double>({shared.size(), 3});
-    if (!shared.empty()) {
-        std::memcpy(points.data, shared.data(), shared.size() * sizeof(Vec3));
-    }
     return nb::make_tuple(status.array, lower.array, upper.array, normal.array, point.array, wide.array,
-                          looks.array, points.array, offsets.array);
+                          looks.array, points_of(shared).array, offsets.array);
+}
+
+nb::tuple shared_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
+                         const Motions& motion_b, double time, double span, const Rows3& normal,
+                         const Rows3& slack) {
+    const TurningSide a(bodies_a, motion_a);
+    const TurningSide b(bodies_b, motion_b);
+    const std::size_t count = a.size() == 1 ? b.size() : a.size();
+    const Vec3 across{normal.data()[0], normal.data()[1], normal.data()[2]};
+    const double* row = slack.data();
+    const auto offsets = empty<std::int64_t>({count + 1});
+    offsets.data[0] = 0;
+    std::vector<Vec3> shared;
+    {
+        const nb::gil_scoped_release unlocked;
+        TurningSolver solver;
+        for (std::size_t i = 0; i < count; ++i) {
+            const TurningContact found =
+                solver.share(a[i], b[i], time, span, across, {row[0], row[1], row[2]});
+            shared.insert(shared.end(), found.points.begin(), found.points.end());
+            offsets.data[i + 1] = static_cast<std::int64_t>(shared.size());
+        }
+    }
+    return nb::make_tuple(points_of(shared).array, offsets.array);
 }
 
 }  // namespace
@@ -135,6 +163,9 @@ void define_turning(nb::module_& m) {
     m.def("first_contact_turning", first_contact_turning, nb::arg("a"), nb::arg("b"),
           nb::arg("motion_a").noconvert(), nb::arg("motion_b").noconvert(), nb::arg("t_max"),
           nb::arg("tolerance"), nb::arg("slack").noconvert(), nb::arg("contact_set") = false);
+    m.def("shared_turning", shared_turning, nb::arg("a"), nb::arg("b"), nb::arg("motion_a").noconvert(),
+          nb::arg("motion_b").noconvert(), nb::arg("time"), nb::arg("span"), nb::arg("normal").noconvert(),
+          nb::arg("slack").noconvert());
 }
 
 }  // namespace geomsrv::bind

@@ -710,20 +710,17 @@ Vec3 TurningSolver::normal_of(const Look& at, const Witness& feature, Vec3 norma
 }
 
 /// What the bodies share that are seen just before they touch, within a span of time in which their points
-/// come no further than `near`.
-void TurningSolver::find_points(const Look& at, const Witness& feature, Vec3 middle, double near, double span,
-                                TurningContact& out) {
+/// come no further than `near`; seen along each of the normals.
+void TurningSolver::find_points(const Look& at, std::span<const Vec3> normals, Vec3 middle, double near,
+                                double span, TurningContact& out) {
     ContactBand band{};
     band.near = near;
     band.apart = slack_.margin + kBandApart * near;
     const double turned = kBandTurn * (a_.body.speed() + b_.body.speed()) * span;
     band.wide[0] = kBandLean * near + turned * a_.body.reach();
     band.wide[1] = kBandLean * near + turned * b_.body.reach();
-    const Vec3 normals[] = {out.normal, normal_of(at, feature, out.normal)};
-    const bool same =
-        normals[0].x == normals[1].x && normals[0].y == normals[1].y && normals[0].z == normals[1].z;
     points_.clear();
-    for (const Vec3 point : contact_.between(at.a, at.b, {normals, same ? 1U : 2U}, middle, band)) {
+    for (const Vec3 point : contact_.between(at.a, at.b, normals, middle, band)) {
         points_.push_back(in_world(point, at.t));
     }
     if (planar_ && points_.size() == 2) {
@@ -861,7 +858,10 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
                 out.point = in_world(middle, next);
                 out.normal = seen ? then.found.normal : predicted;
                 if (contact_set && out.status != TurningStatus::touching) {
-                    find_points(then, feature_then, middle, moved, span, out);
+                    const Vec3 normals[] = {out.normal, normal_of(then, feature_then, out.normal)};
+                    const bool same = normals[0].x == normals[1].x && normals[0].y == normals[1].y &&
+                                      normals[0].z == normals[1].z;
+                    find_points(then, {normals, same ? 1U : 2U}, middle, moved, span, out);
                 }
                 return out;
             }
@@ -870,6 +870,56 @@ TurningContact TurningSolver::search(const TurningBody& a, const TurningBody& b,
         start = unit_or(direction.normal + step * direction.change, direction.normal);
     }
     out.lower = t;
+    return out;
+}
+
+/// Adds the normals of the faces of a triangle or box, where it is placed.
+void TurningSolver::add_faces(const TurningBody& body, const Side& side) {
+    const auto add = [&](std::size_t i, std::size_t j) {
+        const Vec3 first = side.body.placed(0);
+        const Vec3 n = cross(side.body.placed(i) - first, side.body.placed(j) - first);
+        if (norm(n) > 0.0) {
+            normals_.push_back(normalized(n));
+        }
+    };
+    if (body.half != nullptr) {
+        add(1, 2);
+        add(2, 4);
+        add(4, 1);
+    } else if (body.count == 3) {
+        add(1, 2);
+    }
+}
+
+TurningContact TurningSolver::share(const TurningBody& a, const TurningBody& b, double t, double span,
+                                    Vec3 normal, const TurningSlack& slack) {
+    prepare(a, b, slack);
+    seen_ = {};
+    TurningContact out;
+    out.normal = nan_vector();
+    if (!a_.body.placeable(t) || !b_.body.placeable(t)) {
+        return out;
+    }
+    const Look at = look(t, norm(normal) > 0.0 ? normal : unit_or(narrow(between_), {1.0, 0.0, 0.0}));
+    const double moved = way(span) + kBandRounding * (at.error + kHeightError * at.size);
+    if (!(at.found.length <= slack_.margin + moved)) {
+        return out;
+    }
+    // The normal between nearest points is off by what rounds over their distance: faces go before it.
+    normals_.assign(1, normal);
+    add_faces(a, a_);
+    add_faces(b, b_);
+    std::erase_if(normals_, [&](Vec3& n) {
+        const auto parts = [&](Vec3 along) {
+            return lowest(at.b, along).value - highest(at.a, along).value >= slack_.margin - moved;
+        };
+        n = parts(-n) ? -n : n;
+        return !parts(n);
+    });
+    normals_.push_back(at.found.normal);
+    normals_.push_back(normal_of(at, at.found.witness, at.found.normal));
+    out.normal = normals_.front();
+    find_points(at, normals_, 0.5 * (at.found.point_a + at.found.point_b), moved, span, out);
     return out;
 }
 

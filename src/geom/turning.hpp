@@ -53,6 +53,11 @@ public:
     TurningContact solve(const TurningBody& a, const TurningBody& b, double t_max, double tolerance,
                          const TurningSlack& slack = {}, bool contact_set = false);
 
+    /// What pieces of two larger bodies share that are apart until t, and may touch within the span after it:
+    /// as `points` of `solve`, none where they stay apart.  `normal` is that of the larger bodies, or NaN.
+    TurningContact share(const TurningBody& a, const TurningBody& b, double t, double span, Vec3 normal,
+                         const TurningSlack& slack);
+
 private:
     struct Side {
         TurningVertices body;
@@ -83,8 +88,9 @@ private:
     double certain_depth(const Look& at);
     double certain_contact(const Look& at, const Witness& feature, double lower, double end,
                            double tolerance);
-    void find_points(const Look& at, const Witness& feature, Vec3 middle, double near, double span,
+    void find_points(const Look& at, std::span<const Vec3> normals, Vec3 middle, double near, double span,
                      TurningContact& out);
+    void add_faces(const TurningBody& body, const Side& side);
     Vec3 normal_of(const Look& at, const Witness& feature, Vec3 normal) const;
     double way(double span) const;
     double vague(double t) const { return slack_.uncertainty + slack_.drift * t; }
@@ -102,6 +108,7 @@ private:
     PlacedContactPoints contact_;
     std::vector<Vec3> points_;
     std::vector<double> prism_;  // on a planar body, with corners above and below it
+    std::vector<Vec3> normals_;
 };
 
 }  // namespace geomsrv

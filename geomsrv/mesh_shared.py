@@ -1,0 +1,152 @@
+# Copyright 2026 The geomsrv authors
+# SPDX-License-Identifier: Apache-2.0
+"""What two bodies share that turn, of which one is a mesh, when they touch: that of all pairs of pieces, put together.
+
+The time is known, and an interval that holds the contact.  At that time pieces are looked for that may touch within
+the interval: each pair is asked, as bodies that turn are, for what it shares within the way made meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geomsrv import _core
+from geomsrv.answers import ContactStatus, FloatArray, IntArray
+from geomsrv.mesh_contact import united_in_space
+from geomsrv.mesh_tree import Tree, in_order
+
+__all__ = ["MOST_SHARED", "Bodies", "Moving", "shared_parts"]
+
+# Pairs of pieces that are asked for what they share; of more, which all touch at once, nothing is told but a point.
+MOST_SHARED = 16384
+
+# What the engine takes for the same, 4 times what rounds in placing two pieces, which is 73 u of their reach for each
+# and 16 u of both; and a point in the fixed frame.  Of the largest coordinate, rounded up.
+TURNED_ROUNDING = 1024.0 * 2.0**-53
+
+# The same for what the caller says that bodies are off by.
+OFF_ROUNDING = 4.0
+
+# A point that a pair shares is no further than twice what is the same from both, so those of two pairs from one
+# another by four times as much; and as far again, where edges cross that are off.
+SAME_PLACE = 8.0
+
+Bodies = tuple[Any, ...]  #: as the engine reads them: centres, axes, half extents; or hulls
+
+
+class Moving(NamedTuple):
+    """A body of pieces, or a convex one, which is its only piece, and how it moves."""
+
+    tree: Tree
+    nodes: Callable[[IntArray], Bodies]  #: what holds the pieces in nodes of the tree, at the start
+    pieces: Callable[[IntArray], Bodies]  #: listed ones, at the start
+    motion: FloatArray  #: (1, 9) velocity, angular velocity, centre
+
+    def bounds(self, nodes: IntArray, time: float) -> tuple[FloatArray, FloatArray]:
+        """Low and high corners (k, 3), or (1, 3), of boxes around nodes at a time."""
+        velocity, turning, center = self.motion.reshape(3, 3)
+        turn = _turn(turning, time)
+        first, *rest = self.nodes(nodes)
+        at = (first - center) @ turn.T + (center + time * velocity)
+        if len(rest) == 2:
+            half = np.einsum("kij,ki->kj", np.abs(rest[0] @ turn.T), rest[1])
+            return at - half, at + half
+        ends = rest[0][:-1]
+        return np.minimum.reduceat(at, ends, axis=0), np.maximum.reduceat(at, ends, axis=0)
+
+    def sweep(self) -> float:
+        """No point is faster [m/s], seen from the centre."""
+        _, turning, center = self.motion.reshape(3, 3)
+        first, *rest = self.nodes(np.ones(1, np.int64))
+        reach = float(np.linalg.norm(first - center, axis=1).max())
+        if len(rest) == 2:
+            reach += float(np.linalg.norm(rest[1][0]))
+        return reach * float(np.linalg.norm(turning))
+
+
+def _turn(turning: FloatArray, time: float) -> FloatArray:
+    """Rotation matrix of an angular velocity and a time."""
+    rate = float(np.linalg.norm(turning))
+    if rate == 0.0:
+        return np.eye(3)
+    x, y, z = turning / rate
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: FloatArray = np.eye(3) + math.sin(rate * time) * across + (1.0 - math.cos(rate * time)) * (across @ across)
+    return turn
+
+
+def shared_parts(
+    a: Moving, b: Moving, status: int, lower: float, upper: float, normal: FloatArray, slack: FloatArray
+) -> list[FloatArray]:
+    """Points, segments and rings that bodies share which touch in an interval of time; empty if that is too much.
+
+    Parameters
+    ----------
+    normal : (3,) float
+        That of the contact, or NaN.
+    slack : (1, 3) float
+        Margin [m] up to which bodies are in contact, what they are off by [m], and drift [m/s].
+    """
+    margin, off = float(slack[0, 0]), float(slack[0, 1])
+    resting = status in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING)
+    if status == ContactStatus.OVERLAPPING and margin > 0.0:
+        return []  # all that is within the margin
+    span = 0.0 if resting else math.nextafter(lower, math.inf) - lower
+    if status == ContactStatus.WILL_TOUCH:
+        span = upper - lower
+    velocity = a.motion[0, :3] - b.motion[0, :3]
+    way = (float(np.linalg.norm(velocity)) + a.sweep() + b.sweep()) * span
+    root = np.ones(1, np.int64)
+    size = max(float(np.abs(end).max()) for body in (a, b) for end in body.bounds(root, lower))
+    same = way + OFF_ROUNDING * off + TURNED_ROUNDING * size
+    pairs = _near(a, b, lower, margin + same)
+    if pairs is None or not len(pairs[0]):
+        return []
+    sides = a.pieces(pairs[0]), b.pieces(pairs[1])
+    if resting and margin == 0.0:
+        still = np.zeros((1, 3))
+        found: Any = _core.first_contact_world(*sides, still, still, 0.0, True, "float64")
+        points, offsets = found[6:8]
+    else:
+        points, offsets = _core.shared_turning(*sides, a.motion, b.motion, lower, span, normal[None], slack)
+    sets = [points[i:j] for i, j in zip(offsets[:-1].tolist(), offsets[1:].tolist(), strict=True) if i < j]
+    if not sets:
+        return []
+    # Two points a margin apart, one as far to the side as makes no difference: midway between them half as far.
+    place = SAME_PLACE * same + 2.0 * math.sqrt(margin * same)
+    # In a power of two near the size, so that no product overflows or vanishes.
+    unit = math.frexp(size)[1]
+    scaled = [np.ldexp(part, -unit) for part in sets]
+    return [np.ldexp(part, unit) for part in united_in_space(scaled, math.ldexp(place, -unit), normal)]
+
+
+def _near(a: Moving, b: Moving, time: float, room: float) -> tuple[IntArray, IntArray] | None:
+    """Pairs of pieces whose boxes are within some room of one another at a time; None if they are too many."""
+    found: list[tuple[IntArray, IntArray]] = []
+    count = 0
+
+    def keys(nodes_a: IntArray, nodes_b: IntArray) -> FloatArray:
+        if not len(nodes_a):
+            return np.zeros(0)
+        (low_a, high_a), (low_b, high_b) = a.bounds(nodes_a, time), b.bounds(nodes_b, time)
+        near = ((low_a - high_b <= room) & (low_b - high_a <= room)).all(axis=1)
+        # The smallest first, so that few wait.
+        return np.where(near, -(nodes_a + nodes_b), np.inf)
+
+    def look(pieces_a: IntArray, pieces_b: IntArray) -> None:
+        nonlocal count
+        found.append((pieces_a, pieces_b))
+        count += len(pieces_a)
+
+    in_order(a.tree, b.tree, keys, lambda: np.inf if count <= MOST_SHARED else -np.inf, look)
+    if count > MOST_SHARED:
+        return None
+    if not found:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    one, two = (np.concatenate(side) for side in zip(*found, strict=True))
+    order = np.lexsort((two, one))
+    return one[order], two[order]
