@@ -22,7 +22,7 @@ from geomsrv.answers import BoolArray, ByteArray, ContactStatus, DistanceStatus,
 from geomsrv.narrow_phase import RELATIVE_POSE_ROUNDING
 from geomsrv.world import ROUNDOFF, World
 
-__all__ = ["advance"]
+__all__ = ["Look", "advance", "nearest_at"]
 
 # Looks at a pair; what has not come to an end then turns fast beside a body that it does not meet, or for ever.
 MOST_LOOKS = 1000
@@ -202,6 +202,11 @@ class _Motion:
             table.frusta,
         )
         return Look(lower, upper, point_a, point_b, normal, status == DistanceStatus.OK)
+
+
+def nearest_at(world: World, pairs: IntArray, time: float) -> Look:
+    """Nearest points of pairs at a time."""
+    return _Motion.of(world, pairs).look(np.full(len(pairs), time), False)
 
 
 def _supports(motion: _Motion, side: int, rotation: FloatArray, direction: FloatArray) -> FloatArray:

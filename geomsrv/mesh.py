@@ -18,7 +18,7 @@ from geomsrv import _validate
 from geomsrv.answers import ContactStatus, Cost, FirstContacts, FloatArray, IntArray, sets_end_to_end
 from geomsrv.errors import GeometryError, NotAvailableError
 from geomsrv.mesh_contact import common_plane, united_in_space
-from geomsrv.mesh_shared import Moving, shared_parts
+from geomsrv.mesh_shared import Contact, Moving, shared_parts
 from geomsrv.mesh_tree import Sweep, Tree, in_order
 from geomsrv.shapes import Boxes, Convex, Mesh, Polytopes
 from geomsrv.turning import approach, middles, packed, turns
@@ -330,8 +330,8 @@ def _first_turning(q: _Question) -> _Row:
         row.closing_speed = float(found.column("closing_speed")[first])
     if q.wanted and len(found.set_of(first)):
         exactly = np.zeros((1, 3))  # no margin, nothing in doubt
-        parts = shared_parts(q.moving(0), q.moving(1), row.status, low, high, row.normal, exactly)
-        row.parts = parts or [found.set_of(first)]
+        contact = Contact(row.status, low, high, row.normal, exactly)
+        row.parts = shared_parts(q.moving(0), q.moving(1), contact) or [found.set_of(first)]
     return row
 
 

@@ -19,10 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomsrv import _core
-from geomsrv.advancement import advance
+from geomsrv.advancement import advance, nearest_at
 from geomsrv.answers import BoolArray, ByteArray, ContactStatus, FloatArray, IntArray
 from geomsrv.mesh import NODE_ROUNDING, SMALLEST, TURNING_BATCH
-from geomsrv.mesh_shared import Bodies, Moving, shared_parts
+from geomsrv.mesh_shared import (
+    MOST_SHARED,
+    OFF_ROUNDING,
+    SAME_PLACE,
+    TURNED_ROUNDING,
+    Bodies,
+    Contact,
+    Moving,
+    near_pieces,
+    shared_parts,
+    united,
+)
 from geomsrv.mesh_tree import Tree, in_order
 from geomsrv.narrow_phase import RELATIVE_POSE_ROUNDING, placed
 from geomsrv.shapes import Mesh, PackedShapes
@@ -36,6 +47,9 @@ MOST_PIECES = 256
 
 # Pairs of pieces that are looked at where some touch at the start, to see whether others overlap.
 MOST_TOUCHING = 8192
+
+# Nearest points in one plane: each is off by what is the same, and so is the plane.
+FLAT = 4.0
 
 __all__ = ["Answer", "follow_meshes", "meshes"]
 
@@ -60,11 +74,11 @@ def follow_meshes(
     tolerance: float,
     slack: FloatArray,
     core: Callable[[int], Bodies],
-    contact_set: bool,
+    shift: FloatArray | None,
 ) -> tuple[ByteArray, FloatArray, FloatArray, FloatArray, NDArray[np.object_]]:
     """Status, lower, upper and normal of pairs, as of the engine's kernel for bodies that turn, and contact sets.
 
-    These are lists of parts, or None; such as are not wanted are one point.
+    These are lists of parts; or (1, 3), the point between the nearest points of the cores; or None.
 
     Parameters
     ----------
@@ -73,8 +87,8 @@ def follow_meshes(
         within.
     core : callable
         The box, hull, or core of a round body in a row of the world, as the engine reads it.
-    contact_set : bool
-        Whether contact sets are wanted.
+    shift : (k,) float
+        Of points of contact from midway between cores [m], along the normal; None where no contact sets are wanted.
     """
     rows = []
     sets = np.empty(len(pairs), dtype=object)
@@ -88,7 +102,8 @@ def follow_meshes(
         rows.append(_first(question))
         point = rows[-1][4]
         if not np.isnan(point[0]):
-            sets[k] = (contact_set and question.shared(*rows[-1][:4])) or [point[None]]
+            parts = [] if shift is None else question.shared(rows[-1], float(shift[k]))
+            sets[k] = parts or point[None]
     status, lower, upper = (np.array([row[k] for row in rows]) for k in range(3))
     normal = np.array([row[3] for row in rows]).reshape(-1, 3)
     return status.astype(np.uint8), lower, upper, normal, sets
@@ -109,7 +124,7 @@ class _Side:
         self.mesh = body if isinstance(body, Mesh) else None
         if isinstance(body, Mesh):
             self.tree = body.tree
-            self._vertices = self._placed(body.vertices)
+            self.vertices = self._placed(body.vertices)
             return
         self.tree = Tree(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1, np.int64))
         self.curved = self.kind > HALF_SPACE
@@ -133,7 +148,7 @@ class _Side:
         """Triangles, in the fixed frame."""
         if self.mesh is None:
             return self._body
-        corners = self._vertices[self.mesh.triangles[rows]].reshape(-1, 3)
+        corners = self.vertices[self.mesh.triangles[rows]].reshape(-1, 3)
         return corners, np.arange(0, len(corners) + 1, 3)
 
     def corners(self, rows: IntArray) -> FloatArray:
@@ -174,22 +189,109 @@ class _Question(NamedTuple):
         )
         return found[:5]  # type: ignore[no-any-return]
 
-    def shared(self, status: int, lower: float, upper: float, normal: FloatArray) -> list[FloatArray]:
-        """Contact set, part by part; empty where a point must do."""
-        if any(body.mesh is None and (body.curved or body.kind == HALF_SPACE) for body in (self.a, self.b)):
-            return []
+    def shared(self, row: _Row, shift: float) -> list[FloatArray]:
+        """Contact set, part by part, points of pairs of pieces moved by a shift; empty where a point must do."""
+        status, lower, upper, normal, point = row
+        contact = Contact(status, lower, upper, normal, self.slack)
         a, b = (Moving(body.tree, body.nodes, body.pieces, body.motion) for body in (self.a, self.b))
-        return shared_parts(a, b, status, lower, upper, normal, self.slack)
+        mesh, other = (self.a, self.b) if self.a.mesh is not None else (self.b, self.a)
+        if other.mesh is not None or other.kind < HALF_SPACE:
+            return shared_parts(a, b, contact, shift)
+        if np.isnan(normal[0]):
+            return []
+        if other.kind == HALF_SPACE:
+            first = mesh is self.a
+            return _on_plane(mesh, *((a, b) if first else (b, a)), first, row, self.slack)
+        return self._on_curved(a, b, mesh, contact)
+
+    def _on_curved(self, a: Moving, b: Moving, mesh: _Side, contact: Contact) -> list[FloatArray]:
+        """Where triangles touch a curved body: of those that hang together and touch one plane the nearest point."""
+        if contact.status == ContactStatus.OVERLAPPING:
+            return []
+        room, _ = contact.same(a, b)
+        near = float(contact.slack[0, 0]) + room
+        pairs = near_pieces(a, b, contact.lower, near)
+        if pairs is None or not len(pairs[0]):
+            return []
+        moving, pieces = (a, pairs[0]) if mesh is self.a else (b, pairs[1])
+        corners = mesh.corners(pieces)
+        world, rows = self._hulls(corners)
+        look = nearest_at(world, rows, contact.lower)
+        places = 0.5 * look.point_a + 0.5 * look.point_b
+        met = np.flatnonzero((look.lower <= near) & ~np.isnan(places).any(axis=1))
+        met = met[np.argsort(look.lower[met], kind="stable")]
+        one, two, three = moving.placed(mesh.pieces(pieces[met])[0], contact.lower).reshape(-1, 3, 3).swapaxes(0, 1)
+        across = np.cross(two - one, three - one)
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        normals = np.divide(across, length, out=np.zeros_like(across), where=length > 0.0)
+        return _places(corners[met], places[met], normals, FLAT * room)
 
     def by_distance(self, hulls: FloatArray, end: float) -> Answer:
         """Hulls (k, m, 3) of points of the mesh, in its own frame, against the curved body or half space."""
+        world, pairs = self._hulls(hulls)
+        return advance(world, pairs, end, self.tolerance, np.repeat(self.slack, len(hulls), axis=0))
+
+    def _hulls(self, hulls: FloatArray) -> tuple[World, IntArray]:
+        """A world of them and the other body, and its pairs."""
         mesh_first = self.a.mesh is not None
         mesh, other = (self.a, self.b) if mesh_first else (self.b, self.a)
         count = len(hulls)
-        world = _of_hulls(self.world, mesh.row, hulls, other.row)
         pairs = np.column_stack([np.arange(count), np.full(count, count)])
-        slack = np.repeat(self.slack, count, axis=0)
-        return advance(world, pairs if mesh_first else pairs[:, ::-1], end, self.tolerance, slack)
+        return _of_hulls(self.world, mesh.row, hulls, other.row), pairs if mesh_first else pairs[:, ::-1]
+
+
+def _places(corners: FloatArray, points: FloatArray, normals: FloatArray, flat: float) -> list[FloatArray]:
+    """The first point of triangles (k, 3, 3) that hang together: by corners, and by a plane of which both touch."""
+    names = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3).tolist()
+    beside: dict[int, list[int]] = {}
+    for k, row in enumerate(names):
+        for name in row:
+            beside.setdefault(name, []).append(k)
+    free = np.ones(len(names), np.bool_)
+    found = []
+    while free.any():
+        group = [int(np.argmax(free))]
+        found.append(points[group[0]][None])
+        free[group] = False
+        for k in group:  # which grows
+            near = np.unique(np.concatenate([beside[name] for name in names[k]]))
+            near = near[free[near]]
+            arms = points[near] - points[k]
+            level = (np.abs(arms @ normals[k]) <= flat) | (np.abs((arms * normals[near]).sum(axis=1)) <= flat)
+            free[near[level]] = False
+            group += near[level].tolist()
+    return found
+
+
+def _on_plane(
+    side: _Side, mesh: Moving, plane: Moving, mesh_first: bool, row: _Row, slack: FloatArray
+) -> list[FloatArray]:
+    """Corners, edges and triangles of a mesh in the plane that they touch, midway between both."""
+    status, lower, upper, normal, point = row
+    contact = Contact(status, lower, upper, normal, slack)
+    assert side.mesh is not None
+    if status == ContactStatus.OVERLAPPING:
+        return []
+    used, triangles = np.unique(side.mesh.triangles, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    at = mesh.placed(side.vertices[used], lower)
+    down = normal if mesh_first else -normal
+    velocity, turning, center = plane.motion.reshape(3, 3)
+    arms = at - (center + lower * velocity)
+    speed = float(np.linalg.norm(mesh.motion[0, :3] - velocity)) + mesh.sweep()
+    speed += float(np.linalg.norm(turning)) * float(np.linalg.norm(arms, axis=1).max())
+    size = float(max(np.abs(at).max(), np.abs(arms).max()))
+    same = speed * contact.span + OFF_ROUNDING * float(slack[0, 1]) + TURNED_ROUNDING * size
+    heights = at @ down
+    low = heights >= heights.max() - same
+    at = at + ((point - at) @ down)[:, None] * down
+    count = low[triangles].sum(axis=1)
+    faces, bent = triangles[count == 3], triangles[count == 2]
+    edges = np.unique(np.sort(bent[low[bent]].reshape(-1, 2), axis=1), axis=0)
+    corners = np.setdiff1d(np.flatnonzero(low), np.concatenate([faces.ravel(), edges.ravel()]))
+    if len(faces) + len(edges) + len(corners) > MOST_SHARED:
+        return []
+    return united([at[part] for part in (*faces, *edges, *corners[:, None])], SAME_PLACE * same, size, normal)
 
 
 def _of_hulls(world: World, row: int, hulls: FloatArray, other: int) -> World:

@@ -19,7 +19,18 @@ from geomsrv.answers import ContactStatus, FloatArray, IntArray
 from geomsrv.mesh_contact import united_in_space
 from geomsrv.mesh_tree import Tree, in_order
 
-__all__ = ["MOST_SHARED", "Bodies", "Moving", "shared_parts"]
+__all__ = [
+    "MOST_SHARED",
+    "OFF_ROUNDING",
+    "SAME_PLACE",
+    "TURNED_ROUNDING",
+    "Bodies",
+    "Contact",
+    "Moving",
+    "near_pieces",
+    "shared_parts",
+    "united",
+]
 
 # Pairs of pieces that are asked for what they share; of more, which all touch at once, nothing is told but a point.
 MOST_SHARED = 16384
@@ -48,15 +59,19 @@ class Moving(NamedTuple):
 
     def bounds(self, nodes: IntArray, time: float) -> tuple[FloatArray, FloatArray]:
         """Low and high corners (k, 3), or (1, 3), of boxes around nodes at a time."""
-        velocity, turning, center = self.motion.reshape(3, 3)
-        turn = _turn(turning, time)
         first, *rest = self.nodes(nodes)
-        at = (first - center) @ turn.T + (center + time * velocity)
+        at = self.placed(first, time)
         if len(rest) == 2:
-            half = np.einsum("kij,ki->kj", np.abs(rest[0] @ turn.T), rest[1])
+            half = np.einsum("kij,ki->kj", np.abs(rest[0] @ _turn(self.motion[0, 3:6], time).T), rest[1])
             return at - half, at + half
         ends = rest[0][:-1]
         return np.minimum.reduceat(at, ends, axis=0), np.maximum.reduceat(at, ends, axis=0)
+
+    def placed(self, points: FloatArray, time: float) -> FloatArray:
+        """Points (k, 3) of the body at the start, at a time."""
+        velocity, turning, center = self.motion.reshape(3, 3)
+        moved: FloatArray = (points - center) @ _turn(turning, time).T + (center + time * velocity)
+        return moved
 
     def sweep(self) -> float:
         """No point is faster [m/s], seen from the centre."""
@@ -79,52 +94,72 @@ def _turn(turning: FloatArray, time: float) -> FloatArray:
     return turn
 
 
-def shared_parts(
-    a: Moving, b: Moving, status: int, lower: float, upper: float, normal: FloatArray, slack: FloatArray
-) -> list[FloatArray]:
-    """Points, segments and rings that bodies share which touch in an interval of time; empty if that is too much.
+class Contact(NamedTuple):
+    """When bodies touch, and how."""
 
-    Parameters
-    ----------
-    normal : (3,) float
-        That of the contact, or NaN.
-    slack : (1, 3) float
-        Margin [m] up to which bodies are in contact, what they are off by [m], and drift [m/s].
+    status: int
+    lower: float
+    upper: float
+    normal: FloatArray  #: (3,) or NaN
+    slack: FloatArray  #: (1, 3) margin [m] up to which bodies are in contact, what they are off by [m], and drift [m/s]
+
+    @property
+    def resting(self) -> bool:
+        """Whether it is at the start."""
+        return self.status in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING)
+
+    @property
+    def span(self) -> float:
+        """How much later the contact may be than the time at which it is looked at."""
+        if self.status == ContactStatus.WILL_TOUCH:
+            return self.upper - self.lower
+        return 0.0 if self.resting else math.nextafter(self.lower, math.inf) - self.lower
+
+    def same(self, a: Moving, b: Moving) -> tuple[float, float]:
+        """What is the same as far as can be told [m], and the largest coordinate."""
+        velocity = a.motion[0, :3] - b.motion[0, :3]
+        way = (float(np.linalg.norm(velocity)) + a.sweep() + b.sweep()) * self.span
+        root = np.ones(1, np.int64)
+        size = max(float(np.abs(end).max()) for body in (a, b) for end in body.bounds(root, self.lower))
+        return way + OFF_ROUNDING * float(self.slack[0, 1]) + TURNED_ROUNDING * size, size
+
+
+def shared_parts(a: Moving, b: Moving, contact: Contact, shift: float = 0.0) -> list[FloatArray]:
+    """Points, segments and rings that bodies share which touch; empty if that is too much to tell.
+
+    The points of a pair of pieces are moved by a shift [m] along its normal: pieces of round bodies are cores.
     """
-    margin, off = float(slack[0, 0]), float(slack[0, 1])
-    resting = status in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING)
-    if status == ContactStatus.OVERLAPPING and margin > 0.0:
+    margin = float(contact.slack[0, 0])
+    if contact.status == ContactStatus.OVERLAPPING and margin > 0.0:
         return []  # all that is within the margin
-    span = 0.0 if resting else math.nextafter(lower, math.inf) - lower
-    if status == ContactStatus.WILL_TOUCH:
-        span = upper - lower
-    velocity = a.motion[0, :3] - b.motion[0, :3]
-    way = (float(np.linalg.norm(velocity)) + a.sweep() + b.sweep()) * span
-    root = np.ones(1, np.int64)
-    size = max(float(np.abs(end).max()) for body in (a, b) for end in body.bounds(root, lower))
-    same = way + OFF_ROUNDING * off + TURNED_ROUNDING * size
-    pairs = _near(a, b, lower, margin + same)
+    same, size = contact.same(a, b)
+    pairs = near_pieces(a, b, contact.lower, margin + same)
     if pairs is None or not len(pairs[0]):
         return []
     sides = a.pieces(pairs[0]), b.pieces(pairs[1])
-    if resting and margin == 0.0:
+    if contact.resting and margin == 0.0:
         still = np.zeros((1, 3))
         found: Any = _core.first_contact_world(*sides, still, still, 0.0, True, "float64")
         points, offsets = found[6:8]
     else:
-        points, offsets = _core.shared_turning(*sides, a.motion, b.motion, lower, span, normal[None], slack)
+        normals, points, offsets = _core.shared_turning(
+            *sides, a.motion, b.motion, contact.lower, contact.span, contact.normal[None], contact.slack
+        )
+        points = points + shift * np.repeat(normals, np.diff(offsets), axis=0)
     sets = [points[i:j] for i, j in zip(offsets[:-1].tolist(), offsets[1:].tolist(), strict=True) if i < j]
-    if not sets:
-        return []
     # Two points a margin apart, one as far to the side as makes no difference: midway between them half as far.
-    place = SAME_PLACE * same + 2.0 * math.sqrt(margin * same)
+    return united(sets, SAME_PLACE * same + 2.0 * math.sqrt(margin * same), size, contact.normal)
+
+
+def united(sets: list[FloatArray], place: float, size: float, normal: FloatArray) -> list[FloatArray]:
+    """What `united_in_space` makes of sets; size is the largest coordinate."""
     # In a power of two near the size, so that no product overflows or vanishes.
     unit = math.frexp(size)[1]
     scaled = [np.ldexp(part, -unit) for part in sets]
     return [np.ldexp(part, unit) for part in united_in_space(scaled, math.ldexp(place, -unit), normal)]
 
 
-def _near(a: Moving, b: Moving, time: float, room: float) -> tuple[IntArray, IntArray] | None:
+def near_pieces(a: Moving, b: Moving, time: float, room: float) -> tuple[IntArray, IntArray] | None:
     """Pairs of pieces whose boxes are within some room of one another at a time; None if they are too many."""
     found: list[tuple[IntArray, IntArray]] = []
     count = 0

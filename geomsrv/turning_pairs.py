@@ -380,10 +380,19 @@ def ask_followed(
     normal, sets = np.zeros((count, 3)), np.empty(count, dtype=object)
     surfaces = meshes(world, pairs)
     looked = _by_distance(world, pairs) & ~surfaces
+    radius = _radii(world)
+    # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
+    shift = np.where(_by_distance(world, pairs), 0.0, 0.5 * (radius[pairs[:, 0]] - radius[pairs[:, 1]]))
     asked = question.horizon, question.tolerance
     if surfaces.any():
-        core = partial(_core_of, world)
-        answer = follow_meshes(world, pairs[surfaces], *asked, slack[surfaces], core, question.contact_set)
+        answer = follow_meshes(
+            world,
+            pairs[surfaces],
+            *asked,
+            slack[surfaces],
+            partial(_core_of, world),
+            shift[surfaces] if question.contact_set else None,
+        )
         status[surfaces], lower[surfaces], upper[surfaces], normal[surfaces], sets[surfaces] = answer
     if looked.any():
         status[looked], lower[looked], upper[looked], normal[looked], point = advance(
@@ -391,7 +400,6 @@ def ask_followed(
         )
         for k, at in zip(np.flatnonzero(looked).tolist(), point, strict=True):
             sets[k] = None if np.isnan(at[0]) else at[None]
-    radius = _radii(world)
     planar, boxes = world.planar[pairs[:, 0]], world.table.boxes[world.shape[pairs]]
     motion = np.column_stack([world.twists, world.poses[:, :3]])
     motion[world.planar, 8] = 0.0
@@ -419,15 +427,9 @@ def ask_followed(
             met = ~np.isnan(found[4][:, 0])
             points, offsets = found[4][met], np.concatenate([[0], np.cumsum(met)])
         sets[part] = point_sets(points, offsets)
-    # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
-    radius = radius[pairs]
-    uneven = np.flatnonzero((radius[:, 0] != radius[:, 1]) & ~_by_distance(world, pairs))
-    shift = 0.5 * (radius[uneven, :1] - radius[uneven, 1:]) * np.nan_to_num(normal[uneven])
-    for k, along in zip(uneven.tolist(), shift, strict=True):
-        parts = sets[k]
-        sets[k] = (
-            [part + along for part in parts] if isinstance(parts, list) else None if parts is None else parts + along
-        )
+    for k in np.flatnonzero(shift).tolist():
+        if sets[k] is not None and not isinstance(sets[k], list):
+            sets[k] = sets[k] + shift[k] * np.nan_to_num(normal[k])
     return status, lower, upper, normal, sets
 
 

@@ -266,3 +266,91 @@ def test_scenes(margin: float, uncertainty: float) -> None:
             for name in ("status", "time", "time_lower", "time_upper", "normal"):
                 assert np.array_equal(getattr(answer, name), getattr(bare, name)), name
             assert len(bare.points) == 0
+
+
+def test_on_half_spaces() -> None:
+    """Also on one that rises and leans, and to a margin."""
+    table, soles = feet()
+    for margin in (0.0, 0.05):
+        for shape, expected in ((CUBE, [SOLE]), (table, soles), (on_edge(CUBE), [EDGE])):
+            for spin in SPINS.values():
+                landing = Landing(shape, spin, (0, 0, 0))
+                body = landed(landing, gs.Mesh(shape.vertices + [0, 0, margin], shape.triangles))
+                ground = gs.SceneObject(
+                    "ground", gs.HalfSpace((0, 0, 1), -0.5), [0, 0, 0.3, 0, 0, 0, 1], [0, 0, 0.2, 0, 0, 0]
+                )
+                answer = scene_of([body, ground]).first_contacts(3.0, margin=margin)
+                assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - T) <= 1e-5
+                found = parts_of(answer)
+                assert same(found, [np.array(part) + [0, 0, margin / 2] for part in expected]), found
+
+
+def groove(n: int) -> gs.Mesh:
+    """Two planes that rise at 45 degrees from the y axis, in strips of n x n squares."""
+    flat = plate(n)
+    return gs.Mesh(np.column_stack([flat.vertices[:, :2], np.abs(flat.vertices[:, 0])]), flat.triangles)
+
+
+@pytest.mark.parametrize("n", [2, 6, 40])
+@pytest.mark.parametrize("name", ["sphere", "ellipsoid", "cone", "cylinder", "capsule"])
+def test_round_bodies_touch_in_as_many_places_as_there_are(n: int, name: str) -> None:
+    """One place on a floor, however fine, and two in a groove; the ends of a capsule that lies."""
+    r = 0.3
+    lying = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]  # along y
+    shape, pose = {
+        "sphere": (gs.Sphere(r), [0, 0, 0, 1]),
+        "ellipsoid": (gs.Ellipsoid((r, 0.2, r)), [0, 0, 0, 1]),
+        "cone": (gs.Cone(0.2, 0.6), [1.0, 0, 0, 0]),
+        "cylinder": (gs.Cylinder(r, 1.0), lying),
+        "capsule": (gs.Capsule(r, 1.0), lying),
+    }[name]
+    deep = np.sqrt(2.0) * r
+    for floor, height in ((plate(n), r), (groove(n), deep)):
+        if name == "cone" and floor is not None and height == deep:
+            continue
+        for spin in ((0, 0, 0.01), (0, 0, 0)):
+            mesh = gs.SceneObject("floor", floor, [0.03, 0.04, 0, 0, 0, 0, 1])
+            start = [0.03, 0.04, height + 1.0, *pose]
+            body = gs.SceneObject(
+                "body", shape, start, [0, 0, -1.0, *(spin if name in ("sphere", "ellipsoid") else (0, 0, 0))]
+            )
+            answer = scene_of([mesh, body]).first_contacts(3.0)
+            assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - 1.0) < 1e-5
+            found = parts_of(answer)
+            wanted = 1 if height == r else 2
+            assert len(found) == wanted, found
+            x = [0.03] if wanted == 1 else [0.03 - deep / 2, 0.03 + deep / 2]
+            z = [0.0] if wanted == 1 else [deep / 2, deep / 2]
+            for part, at in zip(sorted(found, key=lambda p: p[0, 0]), zip(x, z, strict=True), strict=True):
+                assert len(part) == (2 if name == "capsule" else 1)
+                assert np.abs(part[:, [0, 2]] - at).max() < 5e-3
+                if name == "capsule":
+                    assert np.abs(np.sort(part[:, 1]) - [-0.46, 0.54]).max() < 5e-3
+
+
+def test_a_cylinder_on_two_posts() -> None:
+    posts = joined(box_mesh((-0.5, -0.4, -1), (0.5, -0.3, 0)), box_mesh((-0.5, 0.2, -1), (0.5, 0.3, 0)))
+    lying = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]
+    for name, shape in (("cylinder", gs.Cylinder(0.3, 1.0)), ("capsule", gs.Capsule(0.3, 1.0))):
+        items = [gs.SceneObject("posts", posts), gs.SceneObject("o", shape, [0, 0, 1.3, *lying], [0, 0, -1, 0, 0, 0])]
+        found = sorted(parts_of(scene_of(items).first_contacts(3.0)), key=lambda part: part[0, 1])
+        assert len(found) == 2, found
+        for part, (low, high) in zip(found, ((-0.4, -0.3), (0.2, 0.3)), strict=True):
+            assert np.abs(part[:, [0, 2]]).max() < 5e-3 and (part[:, 1] >= low - NEAR).all()
+            assert (part[:, 1] <= high + NEAR).all() and len(part) == (2 if name == "capsule" else 1)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.3, 0.9])
+def test_a_capsule_lies_down_over_the_end_of_a_beam(lean: float) -> None:
+    """Also where that leans: on a box, and on the same as a mesh."""
+    turned = quaternion((0, lean, 0))
+    frame = rotation((0, lean, 0))
+    half = np.array([0.6, 0.2, 0.1])
+    along = [0, np.sin((lean + np.pi / 2) / 2), 0, np.cos((lean + np.pi / 2) / 2)]  # axis along the beam's x
+    at = frame @ [0.35, 0.0, 0.1 + 0.3]
+    for shape in (gs.Box(half), box_mesh(-half, half)):
+        beam = gs.SceneObject("beam", shape, [0, 0, 0, *turned])
+        body = gs.SceneObject("body", gs.Capsule(0.3, 1.0), [*(at + [0, 0, 1.0]), *along], [0, 0, -1, 0, 0, 0])
+        answer = scene_of([beam, body]).first_contacts(3.0)
+        expected = np.array([(-0.15, 0, 0.1), (0.6, 0, 0.1)]) @ frame.T
+        assert abs(answer.time[0] - 1.0) < 1e-5 and far(answer.points, expected) < 5e-3, answer.points

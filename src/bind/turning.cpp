@@ -143,6 +143,7 @@ nb::tuple shared_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, c
     const double* row = slack.data();
     const auto offsets = empty<std::int64_t>({count + 1});
     offsets.data[0] = 0;
+    std::vector<Vec3> normals;
     std::vector<Vec3> shared;
     {
         const nb::gil_scoped_release unlocked;
@@ -150,11 +151,12 @@ nb::tuple shared_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, c
         for (std::size_t i = 0; i < count; ++i) {
             const TurningContact found =
                 solver.share(a[i], b[i], time, span, across, {row[0], row[1], row[2]});
+            normals.push_back(found.normal);
             shared.insert(shared.end(), found.points.begin(), found.points.end());
             offsets.data[i + 1] = static_cast<std::int64_t>(shared.size());
         }
     }
-    return nb::make_tuple(points_of(shared).array, offsets.array);
+    return nb::make_tuple(points_of(normals).array, points_of(shared).array, offsets.array);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ Vec3 vertex_between(const Core& core, const ContactPlane::Point& p) {
 
 }  // namespace
 
-/// Vertices of a hull within a height of the highest.
-void PlacedContactPoints::collect(const Core& core, Vec3 normal, double height, int body) {
+/// Vertices of a hull within a height of the highest, shifted in the plane.
+void PlacedContactPoints::collect(const Core& core, Vec3 normal, double height, int body, Vec2 shift) {
     std::vector<Point>& face = plane_.face_of(body);
     face.clear();
     const double top = highest(core, normal).value;
@@ -31,7 +31,7 @@ void PlacedContactPoints::collect(const Core& core, Vec3 normal, double height, 
     for (int i = 0; i < core.count; ++i) {
         if (normal.x * x[i] + normal.y * y[i] + normal.z * z[i] >= least) {
             const Vec2 v = plane_.flat(vertex_of(core, i));
-            face.push_back({v.x, v.y, body, i, i, 0.0});
+            face.push_back({v.x - shift.x, v.y - shift.y, body, i, i, 0.0});
         }
     }
 }
@@ -76,11 +76,14 @@ bool PlacedContactPoints::same_faces() {
 }
 
 /// Adds what the faces along a normal share to the candidates.
-void PlacedContactPoints::look(const Core& a, const Core& b, Vec3 normal, double near,
+void PlacedContactPoints::look(const Core& a, const Core& b, Vec3 normal, const ContactBand& band,
                                const double height[2]) {
+    const double near = band.near;
     plane_.face(normal);
-    collect(a, normal, height[0], 0);
-    collect(b, -normal, height[1], 1);
+    collect(a, normal, height[0], 0, {});
+    // The plane is looked at along an axis: b has to be where it touches.
+    const Vec2 along = plane_.flat(normal);
+    collect(b, -normal, height[1], 1, {band.margin * along.x, band.margin * along.y});
     if (same_faces()) {
         return;
     }
@@ -114,8 +117,8 @@ std::span<const Vec3> PlacedContactPoints::between(const Core& a, const Core& b,
     known_[1].clear();
     const double tight[2] = {band.near, band.near};
     for (const Vec3 normal : normals) {
-        look(a, b, normal, band.near, tight);
-        look(a, b, normal, band.near, band.wide);
+        look(a, b, normal, band, tight);
+        look(a, b, normal, band, band.wide);
     }
 
     // In the plane of the first normal; the earlier ones are kept.

@@ -23,6 +23,7 @@ struct ContactBand {
     double apart;    ///< what is found on a body is no further from the other
     double near;     ///< D, and what rounds
     double wide[2];  ///< by how much more a face of a, of b, may lean where it goes on beyond what touches
+    double margin;   ///< bodies touch where they are so far apart
 };
 
 class PlacedContactPoints {
@@ -41,8 +42,8 @@ private:
         Vec3 place;
     };
 
-    void look(const Core& a, const Core& b, Vec3 normal, double near, const double height[2]);
-    void collect(const Core& core, Vec3 normal, double height, int body);
+    void look(const Core& a, const Core& b, Vec3 normal, const ContactBand& band, const double height[2]);
+    void collect(const Core& core, Vec3 normal, double height, int body, Vec2 shift);
     void keep_outermost(const Core& core, Vec3 normal, double near, int body);
     bool same_faces();
 

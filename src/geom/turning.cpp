@@ -715,6 +715,7 @@ void TurningSolver::find_points(const Look& at, std::span<const Vec3> normals, V
                                 double span, TurningContact& out) {
     ContactBand band{};
     band.near = near;
+    band.margin = slack_.margin;
     band.apart = slack_.margin + kBandApart * near;
     const double turned = kBandTurn * (a_.body.speed() + b_.body.speed()) * span;
     band.wide[0] = kBandLean * near + turned * a_.body.reach();
