@@ -5,7 +5,8 @@
 The mesh is the union of its triangles, and each of them is followed as a hull of three points.  Boxes around halves of
 halves of the triangles turn with the mesh and are followed, too: what meets later than a proven contact is not looked
 into.  Whatever a pair may be off by counts for every box and triangle, so the least of their bounds are those of the
-whole: apart until the least `lower`, in contact by the least `upper`.
+whole: apart until the least `lower`, in contact by the least `upper`.  What they share then is asked of all pieces that
+touch by then.
 """
 
 from __future__ import annotations
@@ -366,7 +367,7 @@ def _first(q: _Question) -> _Row:
 def _whole(found: list[Answer], tolerance: float, left_out: float) -> _Row:
     """What the answers for pairs of pieces say of the whole, others being left out that meet at some time or later.
 
-    Status and place are those of the first.
+    Status, normal and point are those of the first.
     """
     nowhere = np.full(3, np.nan)
     if not found:

@@ -340,10 +340,11 @@ def first_contact(
         nearest points, are those at ``time``; ``last_time`` is NaN.  The contact set is what the bodies share to within
         the way that they come nearer until ``time_upper``: a face that lies flat within that counts as flat, so a
         smaller ``tolerance`` tells more apart; points are midway between the bodies.  At the start it is that of bodies
-        at rest.  TOUCHING, at the start, and GRAZING are outcomes where
-        neither can be proven, with a ``time_upper`` that may be inf; NOT_CONVERGED is one where the work allowed did
-        not get beyond ``time_lower``, as for two bodies that turn beside each other for ever.  ``cost.counts``: pairs
-        decided in "filter" and "wide" arithmetic, and how many "looks" at them it took.
+        at rest.  That of a Mesh is that of all of it, without seams; of the first pair of triangles only where more
+        than 16,384 pairs touch at once.  TOUCHING, at the start, and GRAZING are outcomes where neither can be proven,
+        with a ``time_upper`` that may be inf; NOT_CONVERGED is one where the work allowed did not get beyond
+        ``time_lower``, as for two bodies that turn beside each other for ever.  ``cost.counts``: pairs decided in
+        "filter" and "wide" arithmetic, and how many "looks" at them it took.
 
     Raises
     ------

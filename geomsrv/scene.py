@@ -216,7 +216,8 @@ class PairContacts(_PairRows):
         Contact set of row i: ``points[point_offsets[i]:point_offsets[i + 1]]``, at ``time``, fixed frame.
     part_offsets : (m + 1,) int64
         Parts of contact sets, of which meshes have several: ``points[part_offsets[k]:part_offsets[k + 1]]``, as in
-        `FirstContacts`.
+        `FirstContacts`.  With a cylinder, cone or ellipsoid each place where a mesh touches is one point; so is all,
+        where more than 16,384 pairs of triangles of meshes that are followed step by step touch at once.
     unsupported : list of (str, str, str)
         Id, id and reason of each UNSUPPORTED row.
     cost : Cost

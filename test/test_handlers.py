@@ -11,6 +11,7 @@ import re
 import numpy as np
 import pytest
 from plain_messages import message, request, response
+from test_mesh_motion import box_mesh
 
 import geomsrv as gs
 from geomsrv.config import Config
@@ -284,6 +285,12 @@ def test_first_contact_of_meshes(desk) -> None:
     got = desk.ask("FirstContact", **fields, want=["contact_set"])
     assert got.status == OK and got.time.tolist() == [2.0] and got.normal.tolist() == [0, 0, -1]
     assert got.point_offsets.tolist() == [0, 8] and got.part_offsets.tolist() == [0, 4, 8]
+    # Turning as they come down they are the same two, on a table that is a mesh.
+    spun = fields | {"twists_a": D([[0, 0, -1, 0, 0, 0.5]]), "shapes_b": shapes(box_mesh((-5, -5, -1), (5, 5, 1)))}
+    turned = desk.ask("FirstContact", **spun, want=["contact_set"])
+    assert turned.status == OK and abs(turned.time[0] - 2.0) < 1e-5
+    assert turned.point_offsets.tolist() == [0, 8] and turned.part_offsets.tolist() == [0, 4, 8]
+    assert desk.ask("FirstContact", **spun).points.tolist() == []
     proof = desk.ask("FirstContact", **fields, certificates=True)
     assert proof.status == OK and '"claim": {}' in proof.certificates[0]
     desk.engine.apply(
