@@ -76,18 +76,54 @@ def united_in_space(sets: Sequence[FloatArray], slack: float, normal: FloatArray
         (points if len(ring) == 1 else segments if len(ring) == 2 else polygons).append(ring)
     planes = _planes(polygons, slack)
     rings = [ring for plane in planes for ring in plane.rings(slack, normal)]
-    bare = [piece for s in _joined(segments, slack) for piece in _uncovered(s, planes, slack)]
+    areas = [(plane, polygon) for plane in planes for polygon in plane.polygons]
+    covers = _Near([polygon for _, polygon in areas], slack)
+    joined = _joined(segments, slack)
+    bare = [
+        piece
+        for s, near in zip(joined, covers.of(joined), strict=True)
+        for piece in _uncovered(s, [areas[k] for k in near], slack)
+    ]
     lone: list[FloatArray] = []
-    for p in points:
-        near = any(np.abs(p - q).max() <= slack for q in lone)
+    beside = _Near(bare, slack).of(points), covers.of(points), _Near(points, slack).of(points)
+    kept = np.zeros(len(points), np.bool_)
+    for i, (p, lines, faces, others) in enumerate(zip(points, *beside, strict=True)):
         if (
-            not near
-            and not any(_beside(s, p[0], slack) for s in bare)
-            and not any(x.holds(p[0], slack) for x in planes)
+            not any(kept[k] and np.abs(p - points[k]).max() <= slack for k in others)
+            and not any(_beside(bare[k], p[0], slack) for k in lines)
+            and not any(plane.holds(polygon, p[0], slack) for plane, polygon in (areas[k] for k in faces))
         ):
+            kept[i] = True
             lone.append(p)
     order = sorted([*lone, *bare], key=lambda part: (len(part), part.tolist()))
     return [*order, *rings]
+
+
+class _Near:
+    """Which of some parts may be within the slack of others: those whose boxes are."""
+
+    def __init__(self, parts: Sequence[FloatArray], slack: float) -> None:
+        self._room = PLANE_REACH * slack
+        self._boxes = _boxes_of(parts)
+
+    def of(self, parts: Sequence[FloatArray]) -> list[list[int]]:
+        """For every one, in their order."""
+        if not parts:
+            return []
+        low, high = _boxes_of(parts)
+        low, high = low - self._room, high + self._room
+        found = _core.overlapping_pairs_between(low, high, *self._boxes)
+        found = found[np.lexsort((found[:, 1], found[:, 0]))]
+        return [part.tolist() for part in np.split(found[:, 1], np.searchsorted(found[:, 0], np.arange(1, len(parts))))]
+
+
+def _boxes_of(parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Low and high corners (k, 3)."""
+    if not parts:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    first = np.cumsum([0, *map(len, parts[:-1])])
+    points = np.concatenate(parts)
+    return np.minimum.reduceat(points, first, axis=0), np.maximum.reduceat(points, first, axis=0)
 
 
 def _ring(points: FloatArray, slack: float) -> FloatArray:
@@ -146,11 +182,10 @@ class _Plane:
         height: FloatArray = way[:, 0] * (at[:, None, 1] - ring[:, 1]) - way[:, 1] * (at[:, None, 0] - ring[:, 0])
         return height
 
-    def holds(self, p: FloatArray, slack: float) -> bool:
-        if not self.contains(p[None], slack):
-            return False
-        at = self.flat(p[None])
-        return any(bool((self.heights(polygon, at) >= -slack).all()) for polygon in self.polygons)
+    def holds(self, polygon: FloatArray, p: FloatArray, slack: float) -> bool:
+        """Whether a point is in one of the polygons."""
+        inside = self.contains(p[None], slack) and (self.heights(polygon, self.flat(p[None])) >= -slack).all()
+        return bool(inside)
 
     def rings(self, slack: float, normal: FloatArray) -> Iterator[FloatArray]:
         """Around all that is in some polygon."""
@@ -165,16 +200,19 @@ class _Plane:
 def _planes(polygons: Sequence[FloatArray], slack: float) -> list[_Plane]:
     """Polygons by their planes, which are drawn through the largest."""
     planes: list[_Plane] = []
+    middles, normals, sizes = np.zeros((len(polygons), 3)), np.zeros((len(polygons), 3)), np.zeros(len(polygons))
     measured = []
     for ring in polygons:
         normal = np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
         measured.append((float(np.linalg.norm(normal)), normal))
     for k in sorted(range(len(polygons)), key=lambda k: -measured[k][0]):
         ring, (area, normal) = polygons[k], measured[k]
-        for plane in planes:
-            if plane.contains(ring, slack):
-                plane.polygons.append(ring)
-                break
+        known = len(planes)
+        arms = ring - middles[:known, None]
+        room = slack * (1.0 + PLANE_REACH * np.linalg.norm(arms, axis=2) / sizes[:known, None])
+        holding = np.flatnonzero((np.abs((arms * normals[:known, None]).sum(axis=2)) <= room).all(axis=1))
+        if len(holding):
+            planes[holding[0]].polygons.append(ring)
         else:
             middle = ring.mean(axis=0)
             arms = ring - middle
@@ -183,6 +221,7 @@ def _planes(polygons: Sequence[FloatArray], slack: float) -> list[_Plane]:
             u, n = arm / size, normal / area
             v = np.cross(n, u)
             planes.append(_Plane(middle, u, v / np.linalg.norm(v), area / size, [ring]))
+            middles[known], normals[known], sizes[known] = middle, planes[known].normal, planes[known].size
     return planes
 
 
@@ -334,21 +373,35 @@ def _area(ring: FloatArray) -> float:
 def _joined(segments: Sequence[FloatArray], slack: float) -> list[FloatArray]:
     """The longest ones: those on one line that overlap or adjoin are one."""
     left = sorted(segments, key=lambda s: float(np.linalg.norm(s[1] - s[0])))
-    whole: list[FloatArray] = []
-    while left:
-        s = left.pop()
-        others = np.array([*left, *whole]).reshape(-1, 2, 3)
-        mates = _mates(s, others, slack)
-        if not mates.any():
-            whole.append(s)
+    near = [set(others) for others in _Near(left, slack).of(left)]
+    part_of = list(range(len(left)))  # where it is now
+    waiting, whole = list(range(len(left))), set[int]()
+
+    def now(k: int) -> int:
+        while part_of[k] != k:
+            part_of[k] = k = part_of[part_of[k]]
+        return k
+
+    while waiting:
+        at = waiting.pop()
+        if now(at) != at:
             continue
-        ends = np.concatenate([s, *others[mates]])
+        s = left[at]
+        near[at] = {now(k) for k in near[at]} - {at}
+        others = sorted(near[at])
+        mates = np.array(others, np.int64)[_mates(s, np.array([left[k] for k in others]).reshape(-1, 2, 3), slack)]
+        if not len(mates):
+            whole.add(at)
+            continue
+        ends = np.concatenate([s, *(left[k] for k in mates)])
         along = ends @ (s[1] - s[0])
-        count = len(left)
-        left = [x for x, mate in zip(left, mates[:count], strict=True) if not mate]
-        whole = [x for x, mate in zip(whole, mates[count:], strict=True) if not mate]
-        left.append(ends[[int(np.argmin(along)), int(np.argmax(along))]])
-    return whole
+        left[at] = ends[[int(np.argmin(along)), int(np.argmax(along))]]
+        for k in mates.tolist():
+            part_of[k] = at
+            near[at] |= near[k]
+            whole.discard(k)
+        waiting.append(at)
+    return [left[k] for k in sorted(whole)]
 
 
 def _mates(s: FloatArray, others: FloatArray, slack: float) -> BoolArray:
@@ -363,25 +416,24 @@ def _mates(s: FloatArray, others: FloatArray, slack: float) -> BoolArray:
     return mates
 
 
-def _uncovered(s: FloatArray, planes: Sequence[_Plane], slack: float) -> Iterator[FloatArray]:
+def _uncovered(s: FloatArray, areas: Sequence[tuple[_Plane, FloatArray]], slack: float) -> Iterator[FloatArray]:
     """What of a segment is in no polygon."""
     way = s[1] - s[0]
     length = float(np.linalg.norm(way))
     hidden = []
-    for plane in planes:
+    for plane, polygon in areas:
         if not plane.contains(s, slack):
             continue
-        for polygon in plane.polygons:
-            heights = plane.heights(polygon, plane.flat(s)) + slack
-            if ((heights < 0.0).all(axis=0)).any():
-                continue
-            drop = heights[0] - heights[1]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                at = heights[0] / drop
-            low = np.where(heights[0] < 0.0, at, 0.0).max()
-            high = np.where(heights[1] < 0.0, at, 1.0).min()
-            if low < high:
-                hidden.append((float(low), float(high)))
+        heights = plane.heights(polygon, plane.flat(s)) + slack
+        if ((heights < 0.0).all(axis=0)).any():
+            continue
+        drop = heights[0] - heights[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = heights[0] / drop
+        low = np.where(heights[0] < 0.0, at, 0.0).max()
+        high = np.where(heights[1] < 0.0, at, 1.0).min()
+        if low < high:
+            hidden.append((float(low), float(high)))
     reached = 0.0
     for low, high in [*sorted(hidden), (1.0, 1.0)]:
         if (low - reached) * length > 2.0 * slack:

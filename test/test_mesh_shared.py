@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from test_mesh_motion import box_mesh, joined
 import geomsrv as gs
 from geomsrv import _validate, mesh_shared
 from geomsrv.answers import ContactStatus
+from geomsrv.mesh_contact import united_in_space
 
 T = 1.0
 NEAR = 1e-5  # way made within the default tolerance, some times over [m]
@@ -354,3 +356,16 @@ def test_a_capsule_lies_down_over_the_end_of_a_beam(lean: float) -> None:
         answer = scene_of([beam, body]).first_contacts(3.0)
         expected = np.array([(-0.15, 0, 0.1), (0.6, 0, 0.1)]) @ frame.T
         assert abs(answer.time[0] - 1.0) < 1e-5 and far(answer.points, expected) < 5e-3, answer.points
+
+
+def test_parts_that_are_far_apart_are_not_held_against_each_other(rng: np.random.Generator) -> None:
+    """Thousands of points, segments and triangles in as many planes: all are left, in little time."""
+    n = 3000
+    middles = 100.0 * rng.permutation(4 * n)[: 2 * n, None] + np.zeros(3)
+    segments = list(middles[:n, None] + rng.normal(size=(n, 2, 3)))
+    triangles = list(middles[n:, None] + rng.normal(size=(n, 3, 3)))
+    points = [part[:1] + 20.0 for part in segments]
+    began = time.perf_counter()
+    parts = united_in_space([*points, *segments, *triangles], 1e-9, np.full(3, np.nan))
+    assert time.perf_counter() - began < 20.0  # and not minutes
+    assert sorted(map(len, parts)) == [1] * n + [2] * n + [3] * n
