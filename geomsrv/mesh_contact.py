@@ -16,6 +16,10 @@ import numpy as np
 from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
 
+# Slacks that are tried, in terms of the first, until no more than so much of an area is lost.
+WIDER = (1.0, 8.0, 64.0)
+LOST = 2.0**-10
+
 __all__ = ["common_plane", "united_in_space"]
 
 # Normals of a triangle, of rounded corners, and of a pair that differ by no more are the same: the latter is taken.
@@ -192,9 +196,22 @@ class _Plane:
         up = self.normal
         wanted = normal if not np.isnan(normal[0]) else up * np.sign(up[np.argmax(np.abs(up))])
         turned = float(up @ wanted) < 0.0
-        for ring in _around(self, slack) if len(self.polygons) > 1 else self.polygons:
+        for ring in self._borders(slack) if len(self.polygons) > 1 else self.polygons:
             flip = _area(self.flat(ring)) < 0.0 if len(self.polygons) == 1 else False
             yield ring[::-1] if flip != turned else ring
+
+    def _borders(self, slack: float) -> list[FloatArray]:
+        """With the least slack that loses no area: corners at small angles are off by more."""
+        whole = sum(abs(_area(self.flat(polygon))) for polygon in self.polygons)
+        best, most = list[FloatArray](), -1.0
+        for wider in WIDER:
+            found = list(_around(self, wider * slack))
+            area = sum(_area(self.flat(ring)) for ring in found) / whole
+            if area > most + LOST:
+                best, most = found, area
+            if most >= 1.0 - LOST:  # else lost, or polygons overlap
+                break
+        return best
 
 
 def _planes(polygons: Sequence[FloatArray], slack: float) -> list[_Plane]:

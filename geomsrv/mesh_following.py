@@ -11,6 +11,7 @@ touch by then.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -209,6 +210,7 @@ class _Question(NamedTuple):
         """Where triangles touch a curved body: of those that hang together and touch one plane the nearest point."""
         if contact.status == ContactStatus.OVERLAPPING:
             return []
+        root = np.ones(1, np.int64)
         room, _ = contact.same(a, b)
         near = float(contact.slack[0, 0]) + room
         pairs = near_pieces(a, b, contact.lower, near)
@@ -225,7 +227,14 @@ class _Question(NamedTuple):
         across = np.cross(two - one, three - one)
         length = np.linalg.norm(across, axis=1, keepdims=True)
         normals = np.divide(across, length, out=np.zeros_like(across), where=length > 0.0)
-        return _places(corners[met], places[met], normals, FLAT * room)
+        # Beside a contact the gap is less than can be told, as far as a ball curves by no more.
+        curve = float(contact.slack[0, 0]) + float(np.max((b if moving is a else a).nodes(root)[2]))
+        place = SAME_PLACE * room + 2.0 * math.sqrt(curve * room)
+        found: list[FloatArray] = []
+        for point in _places(corners[met], places[met], normals, FLAT * room):
+            if all(float(np.abs(point - other).max()) > place for other in found):
+                found.append(point)
+        return found
 
     def by_distance(self, hulls: FloatArray, end: float) -> Answer:
         """Hulls (k, m, 3) of points of the mesh, in its own frame, against the curved body or half space."""

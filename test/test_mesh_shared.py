@@ -9,12 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import reproducer
 from scene_answers import scene_of
 from test_mesh_motion import box_mesh, joined
+from test_turning_contact_set import ROUNDED, way
+from test_turning_contact_set import Landing as Laid
 
 import geomsrv as gs
 from geomsrv import _validate, mesh_shared
 from geomsrv.answers import ContactStatus
+from geomsrv.hull import hull_triangles
 from geomsrv.mesh_contact import united_in_space
 
 T = 1.0
@@ -356,6 +360,39 @@ def test_a_capsule_lies_down_over_the_end_of_a_beam(lean: float) -> None:
         answer = scene_of([beam, body]).first_contacts(3.0)
         expected = np.array([(-0.15, 0, 0.1), (0.6, 0, 0.1)]) @ frame.T
         assert abs(answer.time[0] - 1.0) < 1e-5 and far(answer.points, expected) < 5e-3, answer.points
+
+
+@pytest.mark.parametrize("pieces", ["mesh on mesh", "mesh on hull", "hull on mesh"])
+@pytest.mark.parametrize("size", [2.0**-20, 1.0, 2.0**20])
+def test_what_hulls_share_exactly_their_meshes_share(rng: np.random.Generator, size: float, pieces: str) -> None:
+    """Laid on one another in rational numbers, and turned back by the oracle; facets are cut in parts."""
+
+    def body(points: np.ndarray, kind: str) -> Any:
+        return facets(points, 2) if kind == "mesh" else gs.Polytopes(points, [0, len(points)])
+
+    for dimensions in ((2, 2), (1, 2), (2, 1), (1, 1), (0, 2), (2, 0)):
+        for _ in range(3):
+            laid = Laid(rng, dimensions, size)
+            p = laid.pair
+            how: dict[str, Any] = {
+                f"{what}_{x}": p[key + x] for what, key in (("angular_velocity", "w"), ("center", "c")) for x in "ab"
+            }
+            sides = (body(p[x], kind) for x, kind in zip("ab", pieces.split(" on "), strict=True))
+            answer = gs.first_contact(*sides, p["va"], p["vb"], t_max=2.0, **how)
+            band = way(p, answer) + ROUNDED * size
+            told = reproducer(**p) + f"\n{answer.parts(0)}\n{laid.expected}"
+            assert [len(part) for part in answer.parts(0)] == [len(laid.expected)], told
+            assert far(answer.points, laid.expected) <= 32 * band, told
+
+
+def facets(points: np.ndarray, cuts: int) -> gs.Mesh:
+    """The surface of a hull, triangles cut at their middles."""
+    corners = points[hull_triangles(points)]
+    for _ in range(cuts):
+        middle = corners.mean(axis=1)
+        corners = np.concatenate([np.stack([corners[:, i], corners[:, (i + 1) % 3], middle], axis=1) for i in range(3)])
+    vertices, names = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return gs.Mesh(vertices, names.reshape(-1, 3))
 
 
 def test_parts_that_are_far_apart_are_not_held_against_each_other(rng: np.random.Generator) -> None:
