@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import reproducer
 from scene_answers import scene_of
+from test_mesh_following import moving, others
 from test_mesh_motion import box_mesh, joined
 from test_turning_contact_set import ROUNDED, way
 from test_turning_contact_set import Landing as Laid
@@ -406,3 +408,23 @@ def test_parts_that_are_far_apart_are_not_held_against_each_other(rng: np.random
     parts = united_in_space([*points, *segments, *triangles], 1e-9, np.full(3, np.nan))
     assert time.perf_counter() - began < 20.0  # and not minutes
     assert sorted(map(len, parts)) == [1] * n + [2] * n + [3] * n
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.1])
+def test_a_convex_mesh_shares_what_its_hull_does(rng: np.random.Generator, margin: float) -> None:
+    """In scenes, in whatever way they meet: a point, mostly; beside a round body it is known to some square root."""
+    seen: Counter[str] = Counter()
+    for _ in range(12):
+        shapes = others(rng)
+        for name in ("box", "hull", "frustum", "sphere", "capsule", "ellipsoid", "half space", "mesh"):
+            shape = gs.Convex(shapes["mesh"].vertices) if name == "mesh" else shapes[name]
+            points = rng.normal(size=(8, 3)) * 0.4
+            mesh, other = moving(rng, "m", facets(points, 1)), moving(rng, "o", shape)
+            hull = gs.SceneObject("m", gs.Convex(points), mesh.pose, mesh.twist)
+            whole, wanted = (scene_of([body, other]).first_contacts(3.0, margin=margin) for body in (mesh, hull))
+            if not all(len(x) and x.status[0] == gs.WILL_TOUCH for x in (whole, wanted)):
+                continue
+            seen[name] += 1
+            assert [len(part) for part in parts_of(whole)] == [len(wanted.points)], f"{name}: {parts_of(whole)}"
+            assert far(whole.points, wanted.points) < 2e-3, f"{name}: {whole.points} {wanted.points}"
+    assert len(seen) == 8 and sum(seen.values()) > 40, seen
