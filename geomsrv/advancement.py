@@ -415,7 +415,7 @@ def advance(
     rows = np.flatnonzero(apart)
     time = np.zeros(len(rows))
     part, look = motion.take(rows), begin.take(rows)
-    seen, middle = look.normal.copy(), 0.5 * (look.point_a + look.point_b)
+    seen = look.normal.copy()
     for looks in range(MOST_LOOKS):
         if len(rows) == 0:
             break
@@ -425,7 +425,6 @@ def advance(
         gap = look.lower - own[:, 0] - own[:, 1] - own[:, 2] * time
         free = (gap > 0.0) & ~np.isnan(look.normal).any(axis=1)
         seen = np.where(free[:, None], look.normal, seen)
-        middle = np.where(free[:, None], 0.5 * (look.point_a + look.point_b), middle)
         with np.errstate(invalid="ignore", over="ignore"):
             here = Look(*look[:4], np.where(free[:, None], look.normal, 0.0), look.sound)
             step = _Room(part, time, here, np.where(free, gap, 0.0), own[:, 2]).step(last - time)
@@ -451,13 +450,14 @@ def advance(
             then = part.take(k).look(lower[at], False)
             clear = (then.lower > own[k, 0])[:, None] & ~np.isnan(then.normal)
             normal[at] = np.where(clear, then.normal, seen[k])
-            point[at] = np.where(clear, 0.5 * (then.point_a + then.point_b), middle[k])
+            # Nearest points, or a common one where the bodies are too close to be told apart.
+            point[at] = 0.5 * (then.point_a + then.point_b)
             done[k] = True
         keep = np.flatnonzero(~done)
         angle = following[keep] * _norm(part.spin[keep]).max(axis=1, initial=0.0)
         lower[rows[keep]] = following[keep]
         keep = keep[angle <= LARGEST_ANGLE]
-        rows, time, seen, middle = rows[keep], following[keep], seen[keep], middle[keep]
+        rows, time, seen = rows[keep], following[keep], seen[keep]
         part = part.take(keep)
     return status, lower, upper, normal, point
 

@@ -114,6 +114,32 @@ def test_no_contact_is_missed_and_none_made_up(rng: np.random.Generator, kind_a:
 
 @pytest.mark.parametrize("spins", [False, True])
 @pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
+def test_the_point_of_contact_is_on_both_bodies(
+    rng: np.random.Generator, kind_a: str, kind_b: str, spins: bool
+) -> None:
+    """Midway between nearest points when the time begins, though one long step may have led there."""
+    met = 0
+    for _ in range(10):
+        away = rng.normal(size=3)
+        away *= 4.0 / np.linalg.norm(away)
+        spin = rng.normal(size=3) * spins
+        a = (body(rng, kind_a), np.append(np.zeros(3), random_turn(rng)), np.zeros(6))
+        b = (body(rng, kind_b), np.append(away, random_turn(rng)), np.append(rng.normal(size=3) * 0.1 - away, spin))
+        answer = ask(a, b, 2.0)
+        if not len(answer) or answer.status[0] != ContactStatus.WILL_TOUCH:
+            continue
+        met += 1
+        time, point = float(answer.time_lower[0]), (gs.Sphere(0.0), np.append(answer.points[0], UPRIGHT), np.zeros(6))
+        half = 0.5 * gap_at(a, b, time)[1]
+        for given in (a, b):
+            there = (given[0], moved(given[1], given[2], time), np.zeros(6))
+            # A thousandth of the way that they come within the time interval.
+            assert gap_at(there, point, 0.0)[0] <= half + 1e-3 * 4.0 * TIME_TOLERANCE, reproducer(a=repr(a), b=repr(b))
+    assert met > 2
+
+
+@pytest.mark.parametrize("spins", [False, True])
+@pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
 def test_time_known_by_construction(rng: np.random.Generator, kind_a: str, kind_b: str, spins: bool) -> None:
     """Placed touching, and moved back along the motion for as long as the answer shall be."""
     decided = 0
