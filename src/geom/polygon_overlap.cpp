@@ -58,7 +58,7 @@ GEOMSRV_WIDE_CLONES void leave_levels(const PolygonPair& pair, const PairedPolyg
 }
 
 /// Leaves in work[0] and work[1] of p, for every edge, from where to where it is inside of q, 0 to 1; to -1
-/// if all of it is beyond some axis.
+/// if all of it is beyond some axis; in work[2] and work[3] the first axes that say so.
 ///
 /// Four edges at a time: they need no outcome of one another.
 GEOMSRV_WIDE_CLONES void clip_edges(const PairedPolygon& p, const PairedPolygon& q) {
@@ -78,32 +78,27 @@ GEOMSRV_WIDE_CLONES void clip_edges(const PairedPolygon& p, const PairedPolygon&
         const Lanes next_y = next_of(p.y);
         Lanes enter = none;
         Lanes leave = whole;
+        Lanes enter_axis = none;
+        Lanes leave_axis = none;
         for (std::size_t k = 0; k < q.axes; ++k) {
             const Lanes from = Lanes(q.dx[k]) * x + Lanes(q.dy[k]) * y - Lanes(own[k]);
             const Lanes to = Lanes(q.dx[k]) * next_x + Lanes(q.dy[k]) * next_y - Lanes(own[k]);
             const LaneMask starts_beyond = Lanes(level[k]) < from;
             const LaneMask ends_beyond = Lanes(level[k]) < to;
             const Lanes time = from / (from - to);
-            enter = greater(enter, select(starts_beyond & ~ends_beyond, time, none));
-            leave = lesser(leave, select(ends_beyond, select(starts_beyond, Lanes(-1.0), time), whole));
+            const Lanes axis = static_cast<double>(k);
+            const Lanes entering = select(starts_beyond & ~ends_beyond, time, none);
+            const Lanes leaving = select(ends_beyond, select(starts_beyond, Lanes(-1.0), time), whole);
+            enter_axis = select(enter < entering, axis, enter_axis);
+            enter = greater(enter, entering);
+            leave_axis = select(leaving < leave, axis, leave_axis);
+            leave = lesser(leave, leaving);
         }
         enter.store(p.work[0] + i);
         leave.store(p.work[1] + i);
+        enter_axis.store(p.work[2] + i);
+        leave_axis.store(p.work[3] + i);
     }
-}
-
-/// The axis at which an edge enters or leaves at a time that `clip_edges` has found.
-std::size_t crossed_axis(const PairedPolygon& q, Vec2 start, Vec2 end, double time, bool entering) {
-    for (std::size_t k = 0; k < q.axes; ++k) {
-        const double from = dot(q.axis(k), start) - q.work[0][k];
-        const double to = dot(q.axis(k), end) - q.work[0][k];
-        const double outer = entering ? from : to;
-        const double inner = entering ? to : from;
-        if (outer > q.work[1][k] && !(inner > q.work[1][k]) && from / (from - to) == time) {
-            return k;
-        }
-    }
-    return 0;
 }
 
 }  // namespace
@@ -124,8 +119,8 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
         const double enter = p.work[0][i];
         const double leave = p.work[1][i];
         // Where two edges cross is on both of them, and needs to be found once.
-        const auto add_crossing = [&](double time, bool entering) {
-            const std::size_t axis = crossed_axis(q, p.local(i), p.local(end), time, entering);
+        const auto add_crossing = [&](bool entering) {
+            const auto axis = static_cast<std::size_t>(p.work[entering ? 2 : 3][i]);
             const std::array<std::size_t, 2> edges_of_both = {side == 0 ? i : axis, side == 0 ? axis : i};
             if (axis < q.edges) {
                 if (std::ranges::find(crossed_, edges_of_both) != crossed_.end()) {
@@ -139,7 +134,7 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             // Across a sliver, rounding may exchange the two crossings.
             const double length = std::hypot(p.x[end] - p.x[i], p.y[end] - p.y[i]);
             if (leave >= 0.0 && enter <= 1.0 && (enter - leave) * length <= merging_distance(pair, slack)) {
-                add_crossing(enter, true);
+                add_crossing(true);
             }
             continue;
         }
@@ -148,10 +143,10 @@ void PolygonOverlap::add_part_inside(const PolygonPair& pair, int side, Slack sl
             found_.push_back(p.ring[i]);
         }
         if (enter > 0.0) {
-            add_crossing(enter, true);
+            add_crossing(true);
         }
         if (leave < 1.0) {
-            add_crossing(leave, false);
+            add_crossing(false);
         }
         if (leave == 1.0 && p.edges == 2) {
             found_.push_back(p.ring[end]);

@@ -226,7 +226,7 @@ PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
     // Room for the ring to go on past its end, for tips, and for whole blocks of lanes, two at a time.
     const std::array<std::size_t, 2> lengths = {padded(largest_a + 3 * kLanes),
                                                 padded(largest_b + 3 * kLanes)};
-    constexpr std::size_t kArrays = 8;
+    constexpr std::size_t kArrays = 9;
     around_.resize(lengths[0] + lengths[1]);
     storage_.resize(kArrays * (lengths[0] + lengths[1]));
     Vec2* around = around_.data();
@@ -235,7 +235,8 @@ PolygonPair::PolygonPair(std::size_t largest_a, std::size_t largest_b) {
         PairedPolygon& p = sides_[i];
         p.around = around;
         around += lengths[i];
-        for (double** array : {&p.x, &p.y, &p.dx, &p.dy, &p.gap, &p.work[0], &p.work[1], &p.work[2]}) {
+        for (double** array :
+             {&p.x, &p.y, &p.dx, &p.dy, &p.gap, &p.work[0], &p.work[1], &p.work[2], &p.work[3]}) {
             *array = at;
             at += lengths[i];
         }

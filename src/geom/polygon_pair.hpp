@@ -59,7 +59,7 @@ struct PairedPolygon : ProjectedPolygon<double> {
     Ring ring;  ///< strictly convex, as given; 1 or 2 vertices are a point or a segment
     std::array<std::size_t, 4> tip{};  ///< vertex of each tip axis
     Vec2* around = nullptr;            ///< the ring, going on past its end
-    std::array<double*, 3> work{};     ///< for the query
+    std::array<double*, 4> work{};     ///< for the query
 
     /// First of the vertices on which the axis rests: its edge's, or the tip.
     [[nodiscard]] std::size_t base(std::size_t axis) const { return axis < edges ? axis : tip[axis - edges]; }
