@@ -12,8 +12,11 @@
 #include <cstdlib>
 #include <functional>
 #include <initializer_list>
+#include <memory>
 #include <new>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "geom/frustum.hpp"
 
@@ -114,6 +117,22 @@ Output<T> empty(std::initializer_list<std::size_t> shape) {
     T* const data = static_cast<T*>(view.buf);
     PyBuffer_Release(&view);  // the array keeps its memory
     return {array, data};
+}
+
+/// Points as an array that keeps their vector alive: copying many into fresh memory costs as much as finding
+/// some.
+template <class Point>
+nb::object rows_of(std::vector<Point> points) {
+    constexpr std::size_t kColumns = sizeof(Point) / sizeof(double);
+    if (points.empty()) return empty<double>({0, kColumns}).array;
+    auto kept = std::make_unique<std::vector<Point>>(std::move(points));
+    const std::size_t count = kept->size();
+    double* const data = &kept->front().x;
+    const nb::capsule owner(kept.get(),
+                            [](void* vector) noexcept { delete static_cast<std::vector<Point>*>(vector); });
+    [[maybe_unused]] const auto* const owned = kept.release();
+    return nb::cast(nb::ndarray<nb::numpy, double, nb::shape<-1, kColumns>, nb::c_contig>(
+        data, {count, kColumns}, owner));
 }
 
 }  // namespace geomsrv::bind

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -145,21 +144,6 @@ std::vector<Vec2> first_contacts(const MovingRings& a, const MovingRings& b, dou
         ++counts[static_cast<std::size_t>(contact.rung)];
     }
     return points;
-}
-
-/// Points as an array that keeps their vector alive: copying many into fresh memory costs as much as finding
-/// some.
-nb::object rows_of(std::vector<Vec2> points) {
-    if (points.empty()) {
-        return empty<double>({0, 2}).array;
-    }
-    auto kept = std::make_unique<std::vector<Vec2>>(std::move(points));
-    const std::size_t count = kept->size();
-    double* const data = &kept->front().x;
-    const nb::capsule owner(kept.get(),
-                            [](void* vector) noexcept { delete static_cast<std::vector<Vec2>*>(vector); });
-    [[maybe_unused]] const auto* const owned = kept.release();
-    return nb::cast(nb::ndarray<nb::numpy, double, nb::shape<-1, 2>, nb::c_contig>(data, {count, 2}, owner));
 }
 
 struct DistanceRows {

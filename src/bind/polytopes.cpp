@@ -10,6 +10,7 @@
 #include <string_view>
 #include <type_traits>
 #include <typeinfo>
+#include <utility>
 #include <vector>
 
 #include "bind/arrays.hpp"
@@ -200,13 +201,9 @@ nb::tuple first_contact(const nb::tuple& side_a, const nb::tuple& side_b, const 
                 : accuracy == "exact" ? with(std::type_identity<ExactPolytopeContactSolver>{})
                                       : with(std::type_identity<PolytopeContactSolver>{});
     }
-    const auto points = empty<double>({found.size(), 3});
-    if (!found.empty()) {
-        std::memcpy(points.data, found.data(), found.size() * sizeof(Vec3));
-    }
     return nb::make_tuple(rows.status.array, rows.time.array, rows.time_lower.array, rows.time_upper.array,
-                          rows.last_time.array, rows.normal.array, points.array, rows.point_offsets.array,
-                          rows.certain.array, rows.closing_speed.array,
+                          rows.last_time.array, rows.normal.array, rows_of(std::move(found)),
+                          rows.point_offsets.array, rows.certain.array, rows.closing_speed.array,
                           nb::make_tuple(counts[0], counts[1], counts[2], counts[3]));
 }
 

@@ -3,7 +3,6 @@
 // First contact of bodies that translate and turn, pair by pair.
 #include "geom/turning.hpp"
 
-#include <cstring>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -84,14 +83,6 @@ private:
     int dimension_ = 3;
 };
 
-auto points_of(const std::vector<Vec3>& rows) {
-    const auto points = empty<double>({rows.size(), 3});
-    if (!rows.empty()) {
-        std::memcpy(points.data, rows.data(), rows.size() * sizeof(Vec3));
-    }
-    return points;
-}
-
 nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
                                 const Motions& motion_b, double t_max, double tolerance, const Rows3& slack,
                                 bool contact_set) {
@@ -130,7 +121,7 @@ nb::tuple first_contact_turning(const nb::tuple& bodies_a, const nb::tuple& bodi
         }
     }
     return nb::make_tuple(status.array, lower.array, upper.array, normal.array, point.array, wide.array,
-                          looks.array, points_of(shared).array, offsets.array);
+                          looks.array, rows_of(std::move(shared)), offsets.array);
 }
 
 nb::tuple shared_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, const Motions& motion_a,
@@ -156,7 +147,7 @@ nb::tuple shared_turning(const nb::tuple& bodies_a, const nb::tuple& bodies_b, c
             offsets.data[i + 1] = static_cast<std::int64_t>(shared.size());
         }
     }
-    return nb::make_tuple(points_of(normals).array, points_of(shared).array, offsets.array);
+    return nb::make_tuple(rows_of(std::move(normals)), rows_of(std::move(shared)), offsets.array);
 }
 
 }  // namespace
