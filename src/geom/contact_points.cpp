@@ -88,13 +88,11 @@ GEOMSRV_WIDE_CLONES bool are_outside(const PlaneRows& row, Vec3 p, Vec3 q, doubl
 
 /// Which of up to 64 numbers, in whole lanes, are not less than one: number i as bit i.
 GEOMSRV_WIDE_CLONES std::uint64_t at_least(const double* numbers, std::size_t count, double least) {
-    LaneMask::Vector bits{1, 2, 4, 8};
-    LaneMask::Vector found{};
-    for (std::size_t i = 0; i < count; i += kLanes) {
-        found |= (Lanes(least) <= Lanes::load(numbers + i)).v & bits;
-        bits <<= kLanes;
+    LaneMask found = Lanes(0.0) < Lanes(0.0);
+    for (std::size_t i = 0, block = 0; i < count; i += kLanes, ++block) {
+        found = found | bits_of_block(Lanes(least) <= Lanes::load(numbers + i), block);
     }
-    return static_cast<std::uint64_t>((found[0] | found[1]) | (found[2] | found[3]));
+    return joined(found);
 }
 
 /// clip_part() by all planes, of which the heights of both ends are given, four at a time.

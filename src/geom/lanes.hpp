@@ -160,6 +160,16 @@ GEOMSRV_INLINE LaneMask load_mask(const std::int64_t* from) {
     return LaneMask((LaneMask::Vector)Lanes::load(reinterpret_cast<const double*>(from)).v);
 }
 
+/// Lane i of a block as bit 4 block + i, in that lane: sixteen blocks fit.
+GEOMSRV_INLINE LaneMask bits_of_block(const LaneMask& set, std::size_t block) {
+    static_assert(Lanes::kCount == 4);
+    const LaneMask::Vector bits{1, 2, 4, 8};
+    return set & LaneMask(bits << static_cast<std::int64_t>(Lanes::kCount * block));
+}
+GEOMSRV_INLINE std::uint64_t joined(const LaneMask& bits) {
+    return static_cast<std::uint64_t>((bits.v[0] | bits.v[1]) | (bits.v[2] | bits.v[3]));
+}
+
 /// x where the condition holds, else 0.
 GEOMSRV_INLINE Lanes kept(const LaneMask& condition, const Lanes& x) {
     return Lanes((Lanes::Vector)(condition.v & (LaneMask::Vector)x.v));

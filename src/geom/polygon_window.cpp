@@ -27,17 +27,6 @@ struct CandidateBits {
     std::uint64_t exits = 0;
 };
 
-/// Lane i of a block of axes as bit 4 block + i.
-GEOMSRV_INLINE LaneMask bits_of_block(const LaneMask& set, std::size_t block) {
-    static_assert(kLanes == 4);
-    const LaneMask::Vector bits{1, 2, 4, 8};
-    return set & LaneMask(bits << static_cast<std::int64_t>(kLanes * block));
-}
-
-GEOMSRV_INLINE std::uint64_t joined(const LaneMask& bits) {
-    return static_cast<std::uint64_t>((bits.v[0] | bits.v[1]) | (bits.v[2] | bits.v[3]));
-}
-
 GEOMSRV_WIDE_CLONES CandidateBits candidate_bits(const PairedPolygon& p, std::size_t first, std::size_t end,
                                                  const Window& window) {
     const Lanes zero = 0.0;
