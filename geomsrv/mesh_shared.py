@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geomsrv import _core
+from geomsrv import _core, _validate
 from geomsrv.answers import ContactStatus, FloatArray, IntArray
 from geomsrv.mesh_contact import united_in_space
 from geomsrv.mesh_tree import Tree, in_order
@@ -85,12 +85,10 @@ class Moving(NamedTuple):
 
 def _turn(turning: FloatArray, time: float) -> FloatArray:
     """Rotation matrix of an angular velocity and a time."""
-    rate = float(np.linalg.norm(turning))
-    if rate == 0.0:
-        return np.eye(3)
-    x, y, z = turning / rate
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn: FloatArray = np.eye(3) + math.sin(rate * time) * across + (1.0 - math.cos(rate * time)) * (across @ across)
+    half = 0.5 * time * turning
+    angle = float(np.linalg.norm(half))
+    quaternion = np.append(np.sinc(angle / np.pi) * half, np.cos(angle))
+    turn: FloatArray = _validate.rotation_matrices(quaternion[None])[0]
     return turn
 
 
