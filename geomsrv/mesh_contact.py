@@ -16,11 +16,11 @@ import numpy as np
 from geomsrv import _core
 from geomsrv.answers import BoolArray, FloatArray, IntArray
 
+__all__ = ["common_plane", "united_in_space"]
+
 # Slacks that are tried, in terms of the first, until no more than so much of an area is lost.
 WIDER = (1.0, 8.0, 64.0)
 LOST = 2.0**-10
-
-__all__ = ["common_plane", "united_in_space"]
 
 # Normals of a triangle, of rounded corners, and of a pair that differ by no more are the same: the latter is taken.
 NORMAL_SLACK = 2.0**-40
@@ -187,7 +187,7 @@ class _Plane:
         return height
 
     def holds(self, polygon: FloatArray, p: FloatArray, slack: float) -> bool:
-        """Whether a point is in one of the polygons."""
+        """Whether a point is in a polygon of this plane."""
         inside = self.contains(p[None], slack) and (self.heights(polygon, self.flat(p[None])) >= -slack).all()
         return bool(inside)
 
@@ -225,7 +225,7 @@ def _planes(polygons: Sequence[FloatArray], slack: float) -> list[_Plane]:
     for k in sorted(range(len(polygons)), key=lambda k: -measured[k][0]):
         ring, (area, normal) = polygons[k], measured[k]
         known = len(planes)
-        arms = ring - middles[:known, None]
+        arms = ring - middles[:known, None]  # contains(), of all planes at once
         room = slack * (1.0 + PLANE_REACH * np.linalg.norm(arms, axis=2) / sizes[:known, None])
         holding = np.flatnonzero((np.abs((arms * normals[:known, None]).sum(axis=2)) <= room).all(axis=1))
         if len(holding):

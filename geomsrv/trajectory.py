@@ -14,6 +14,7 @@ what is proven of the pieces is true of the motion.  Where a piece strays too fa
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -374,7 +375,7 @@ def first_contact_along(
     )
 
 
-class Search:
+class Search(ABC):
     """Obstacle by obstacle, the first piece with a contact, halved until it can be told.
 
     What is asked of a piece, and of which obstacles, is for those to say that have them.
@@ -404,12 +405,12 @@ class Search:
         self.looked_at = 0
         self._halved = np.zeros(count, np.int64)
 
+    @abstractmethod
     def look(self, rows: IntArray, piece: Piece, since: float, slack: FloatArray) -> Look:
         """What a piece that begins `since` seconds after the motion has with obstacles in some rows, in its own time.
 
         The time is found to half the tolerance; slack (k, 3) is what the engine's kernel for bodies that turn takes.
         """
-        raise NotImplementedError
 
     def run(self) -> None:
         """Find the status of every obstacle, its times, and normal and point at the earlier one."""

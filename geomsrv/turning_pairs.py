@@ -379,10 +379,11 @@ def ask_followed(
     status, lower, upper = np.zeros(count, np.uint8), np.zeros(count), np.zeros(count)
     normal, sets = np.zeros((count, 3)), np.empty(count, dtype=object)
     surfaces = meshes(world, pairs)
-    looked = _by_distance(world, pairs) & ~surfaces
+    by_distance = _by_distance(world, pairs)
+    looked = by_distance & ~surfaces
     radius = _radii(world)
     # Nearest points are those of the cores; where these are closer than the radii, the surfaces meet.
-    shift = np.where(_by_distance(world, pairs), 0.0, 0.5 * (radius[pairs[:, 0]] - radius[pairs[:, 1]]))
+    shift = np.where(by_distance, 0.0, 0.5 * (radius[pairs[:, 0]] - radius[pairs[:, 1]]))
     asked = question.horizon, question.tolerance
     if surfaces.any():
         answer = follow_meshes(
