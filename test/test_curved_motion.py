@@ -27,6 +27,7 @@ UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 PAIRS = [(a, b) for a, b in itertools.combinations_with_replacement(BOUNDED, 2) if {a, b} & set(CURVED)]
 CAN = gs.Cylinder(0.3, 0.8)
 FLOOR = gs.HalfSpace([0, 0, 1], 0.0)
+POINT_ERROR = 1e-3 * 4.0 * TIME_TOLERANCE  # [m] a thousandth of the way that bodies come, at 4 m/s, within the interval
 
 
 def ask(a: Any, b: Any, horizon: float, **options: Any) -> Any:
@@ -133,8 +134,7 @@ def test_the_point_of_contact_is_on_both_bodies(
         half = 0.5 * gap_at(a, b, time)[1]
         for given in (a, b):
             there = (given[0], moved(given[1], given[2], time), np.zeros(6))
-            # A thousandth of the way that they come within the time interval.
-            assert gap_at(there, point, 0.0)[0] <= half + 1e-3 * 4.0 * TIME_TOLERANCE, reproducer(a=repr(a), b=repr(b))
+            assert gap_at(there, point, 0.0)[0] <= half + POINT_ERROR, reproducer(a=repr(a), b=repr(b))
     assert met > 2
 
 

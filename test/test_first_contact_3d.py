@@ -41,6 +41,9 @@ POINTS_ERROR = 1e-11
 # A rotated copy is off by some 1e-15 of its place; where it meets a facet at a shallow angle, time and place of contact
 # are off by that over the sine of the angle.  Allowances for angles down to about 1e-5, not bounds.
 TURNED_TIME_ERROR = 1e-9
+
+# Vertices of what hulls share [m]: off by some 1e-15, and crossings by as much over the angle, which is above 1e-3.
+SHARED_ERROR = 1e-12
 TURNED_POINTS_ERROR = 1e-10
 
 
@@ -493,8 +496,7 @@ def test_what_hulls_share_has_the_exact_vertices(rng, count):
         nearly, exactly = (gs.first_contact(a, b, (0, 0, 1), (0, 0, 0), accuracy=tier) for tier in ("float64", "exact"))
         assert nearly.status == exactly.status == gs.OVERLAPPING
         assert len(exactly.points) > count / 4
-        # Points are off by some 1e-15, and crossings by as much over the angle, which here is above 1e-3.
-        assert set_distance(nearly.points, exactly.points) < 1e-12
+        assert set_distance(nearly.points, exactly.points) < SHARED_ERROR
         assert len(nearly.points) == len(exactly.points)
 
 

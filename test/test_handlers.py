@@ -288,7 +288,7 @@ def test_first_contact_of_meshes(desk) -> None:
     # Turning as they come down they are the same two, on a table that is a mesh.
     spun = fields | {"twists_a": D([[0, 0, -1, 0, 0, 0.5]]), "shapes_b": shapes(box_mesh((-5, -5, -1), (5, 5, 1)))}
     turned = desk.ask("FirstContact", **spun, want=["contact_set"])
-    assert turned.status == OK and abs(turned.time[0] - 2.0) < 1e-5
+    assert turned.status == OK and abs(turned.time[0] - 2.0) < TIME_TOLERANCE
     assert turned.point_offsets.tolist() == [0, 8] and turned.part_offsets.tolist() == [0, 4, 8]
     assert desk.ask("FirstContact", **spun).points.tolist() == []
     proof = desk.ask("FirstContact", **fields, certificates=True)

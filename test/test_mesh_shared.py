@@ -22,9 +22,12 @@ from geomsrv import _validate, mesh_shared
 from geomsrv.answers import ContactStatus
 from geomsrv.hull import hull_triangles
 from geomsrv.mesh_contact import united_in_space
+from geomsrv.turning import TIME_TOLERANCE
 
 T = 1.0
 NEAR = 1e-5  # way made within the default tolerance, some times over [m]
+LANDED = 10.0 * TIME_TOLERANCE  # [s] poses at the start are rounded, and margins and round bodies meet at a slant
+AT_REST = 1e-12  # [m] the same pieces, placed by other sums of numbers of about 1 m
 FALL = np.array([0.1, -0.05, -1.5])
 SPINS = {"upright": (0.0, 0.0, 0.7), "hinged": (0.0, 0.3, 0.0), "any": (0.2, -0.15, 0.5)}
 
@@ -144,7 +147,7 @@ def test_a_cube_lands_flat(n: int, spin: str) -> None:
         for floor in (landing.floor(plate(n)), landing.slab()):
             answer = landing.onto(floor)
             told = f"frame {k}: {answer.parts(0)}"
-            assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - T) < 1e-6
+            assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - T) < TIME_TOLERANCE
             assert same(answer.parts(0), [landing.world(np.array(SOLE))]), told
             assert far(answer.points, as_box.points) <= NEAR, told
 
@@ -206,7 +209,7 @@ def test_on_a_step_two_planes_touch() -> None:
     turned = Landing(CUBE, SPINS["any"], (0, 0, 0), fall=np.array([1.0, 0.0, -1.0]))
     back = gs.Mesh(step.vertices @ turned.back.T, step.triangles)
     answer = turned.onto(back, angular_velocity_b=SPINS["any"], center_b=(0, 0, 0))
-    assert abs(answer.time[0] - T) < 1e-6 and same(answer.parts(0), [SOLE, wall]), answer.parts(0)
+    assert abs(answer.time[0] - T) < TIME_TOLERANCE and same(answer.parts(0), [SOLE, wall]), answer.parts(0)
 
 
 def test_what_touches_at_the_start_is_what_meshes_at_rest_share() -> None:
@@ -215,7 +218,7 @@ def test_what_touches_at_the_start_is_what_meshes_at_rest_share() -> None:
         rest = gs.first_contact(body, plate(5), (0, 0, 0), (0, 0, 0))
         spun = gs.first_contact(body, plate(5), (0, 0, 0), (0, 0, 0), angular_velocity_a=(0, 0, 1.0))
         assert spun.status[0] in (ContactStatus.TOUCHING, ContactStatus.OVERLAPPING)
-        assert same(spun.parts(0), rest.parts(0), 1e-12), (spun.parts(0), rest.parts(0))
+        assert same(spun.parts(0), rest.parts(0), AT_REST), (spun.parts(0), rest.parts(0))
 
 
 def test_too_many_are_told_as_one_point(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -266,9 +269,9 @@ def test_scenes(margin: float, uncertainty: float) -> None:
         for floor in (gs.SceneObject("floor", plate(5)), slab):
             scene = scene_of([body, floor])
             answer = scene.first_contacts(3.0, margin=margin)
-            assert abs(answer.time[0] - T) <= 1e-5 and answer.status.tolist() == [gs.WILL_TOUCH]
+            assert abs(answer.time[0] - T) <= LANDED and answer.status.tolist() == [gs.WILL_TOUCH]
             midway = [np.array(part) + up / 2 for part in expected]
-            room = NEAR + 4.0 * np.sqrt(margin * 1e-6)
+            room = NEAR + 4.0 * np.sqrt(margin * TIME_TOLERANCE)
             assert same(parts_of(answer), midway, room), parts_of(answer)
             bare = scene.first_contacts(3.0, margin=margin, contact_set=False)
             for name in ("status", "time", "time_lower", "time_upper", "normal"):
@@ -288,7 +291,7 @@ def test_on_half_spaces() -> None:
                     "ground", gs.HalfSpace((0, 0, 1), -0.5), [0, 0, 0.3, 0, 0, 0, 1], [0, 0, 0.2, 0, 0, 0]
                 )
                 answer = scene_of([body, ground]).first_contacts(3.0, margin=margin)
-                assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - T) <= 1e-5
+                assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - T) <= LANDED
                 found = parts_of(answer)
                 assert same(found, [np.array(part) + [0, 0, margin / 2] for part in expected]), found
 
@@ -323,7 +326,7 @@ def test_round_bodies_touch_in_as_many_places_as_there_are(n: int, name: str) ->
                 "body", shape, start, [0, 0, -1.0, *(spin if name in ("sphere", "ellipsoid") else (0, 0, 0))]
             )
             answer = scene_of([mesh, body]).first_contacts(3.0)
-            assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - 1.0) < 1e-5
+            assert answer.status.tolist() == [gs.WILL_TOUCH] and abs(answer.time[0] - 1.0) < LANDED
             found = parts_of(answer)
             wanted = 1 if height == r else 2
             assert len(found) == wanted, found
@@ -361,7 +364,7 @@ def test_a_capsule_lies_down_over_the_end_of_a_beam(lean: float) -> None:
         body = gs.SceneObject("body", gs.Capsule(0.3, 1.0), [*(at + [0, 0, 1.0]), *along], [0, 0, -1, 0, 0, 0])
         answer = scene_of([beam, body]).first_contacts(3.0)
         expected = np.array([(-0.15, 0, 0.1), (0.6, 0, 0.1)]) @ frame.T
-        assert abs(answer.time[0] - 1.0) < 1e-5 and far(answer.points, expected) < 5e-3, answer.points
+        assert abs(answer.time[0] - 1.0) < LANDED and far(answer.points, expected) < 5e-3, answer.points
 
 
 @pytest.mark.parametrize("pieces", ["mesh on mesh", "mesh on hull", "hull on mesh"])
